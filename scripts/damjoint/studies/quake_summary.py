@@ -38,6 +38,8 @@ BROKEN = 0.99
 #: Table of which the largest size is reported.
 PEAKS = ("ground_ax", "crest_ux", "crest_ax")
 PEAKS_OF_JOINTS = ("heel_opening", "toe_opening", "slip_mean", "open_length", "broken_length")
+#: The same with quake_uplift = transient.
+PEAKS_OF_WATER = "p_max", "void", "Re"
 
 #: Columns of an earthquake in a table of several: largest ground acceleration along x [m/s2]; of
 #: the joint with the largest slip: residual slip [m] and tilt, slip of the rigid block [m].
@@ -87,7 +89,9 @@ def summary(quake: Earthquake, rows: Table, halvings: int) -> dict[str, Any]:
         return result
     joints = range(len(quake.case.joints))
     peaks = {}
-    for name in (*PEAKS, *(column_of(name, k) for k in joints for name in PEAKS_OF_JOINTS)):
+    of_water = [name for name in PEAKS_OF_WATER if name in rows]
+    of_joints = [column_of(n, k) for k in joints for n in (*PEAKS_OF_JOINTS, *of_water)]
+    for name in (*PEAKS, *of_joints):
         row = row_of_peak(name, rows[name])
         peaks[name] = {"value": float(rows[name][row]), "time": float(rows["time"][row])}
     for k, joint in enumerate(quake.case.joints):
@@ -99,8 +103,8 @@ def summary(quake: Earthquake, rows: Table, halvings: int) -> dict[str, Any]:
             )
     result["notes"] += filter(None, (lift_off(quake, rows, k) for k in joints))
     if "Re" in rows:
-        of_joints = ({n: rows[column_of(n, k)] for n in ("U", "Re")} for k in joints)
-        words = map(turbulence, quake.case.joints, of_joints)
+        flows = ({n: rows[column_of(n, k)] for n in ("U", "Re")} for k in joints)
+        words = map(turbulence, quake.case.joints, flows)
         result["notes"] += [f"{text}{of(quake.case, k)}" for k, text in enumerate(words) if text]
     return result | {"peaks": peaks} | values_at_end(quake.case, rows, 1 / quake.frequencies[0])
 
