@@ -5,6 +5,7 @@ import csv
 import html
 import io
 import json
+import os
 import re
 import shutil
 import sys
@@ -481,6 +482,20 @@ def test_pages_of_the_report_as_pdf(command, checked, page_of_check, tmp_path, m
         assert ends[max(ends)] not in ("h2", "h3")
         if number < len(pages) - 1:
             assert max(ends) > bottom / 2
+
+
+def test_a_pdf_whose_pictures_are_not_whole_is_not_written(command, checked, monkeypatch):
+    """weasyprint catches all that stops it in a picture, also a signal, and only logs it."""
+    images = pytest.importorskip("weasyprint.svg", exc_type=(ImportError, OSError))
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(images.SVG, "draw", interrupted)
+    code, _, err = command("report", checked, "--to", "my.pdf")
+    assert code == 1
+    assert err.endswith("to = my.pdf: nothing is written, weasyprint: Failed to render SVG image\n")
+    assert "my.pdf" not in os.listdir()
 
 
 def test_a_pdf_without_weasyprint_is_refused(command, checked, tmp_path, monkeypatch):

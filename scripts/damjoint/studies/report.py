@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import logging
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -183,7 +184,35 @@ def renderer(to: Path) -> Callable[[str], bytes]:
             f"to = {to}: a PDF needs weasyprint ({reason}): pip install weasyprint, apt install "
             "libpangoft2-1.0-0; or print the .html page from a browser"
         ) from None
-    return lambda page: weasyprint.HTML(string=page).write_pdf()
+
+    def pdf(page: str) -> bytes:
+        """The page as PDF. Raises RunError if a picture is not drawn whole, which weasyprint, even
+        when it is interrupted, only logs.
+        """
+        errors = ErrorLog(logging.ERROR)
+        weasyprint.LOGGER.addHandler(errors)
+        try:
+            document = weasyprint.HTML(string=page).write_pdf()
+        finally:
+            weasyprint.LOGGER.removeHandler(errors)
+        if errors.messages:
+            why = errors.messages[0].split(" data:")[0]
+            raise RunError(f"to = {to}: nothing is written, weasyprint: {why}")
+        return bytes(document)
+
+    return pdf
+
+
+class ErrorLog(logging.Handler):
+    """Keeps the messages of a log in place of writing them."""
+
+    def __init__(self, level: int) -> None:
+        super().__init__(level)
+        self.messages: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep a message."""
+        self.messages.append(record.getMessage())
 
 
 def page_of(sections: list[RunSection], dam: str = "") -> str:
