@@ -139,10 +139,12 @@ def test_the_table_of_a_run(command, tmp_path):
     assert not (tmp_path / "one/sensitivity.csv").exists()
 
 
-def test_the_table_of_a_critical_level(command, tmp_path):
+def test_the_table_of_a_critical_level(command, tmp_path, texts_drawn):
     settings = [w for n, v in SLIDES.items() for w in ("--set", f"{n}={v}")]
     words = "critical", "dam", *settings, "--set", "mu=0.6", "--levels", "30,36", "--out", "out"
     code, out, _ = command(*words, "--sensitivity", "all")
+    assert (tmp_path / "out/dam_sensitivity.png").exists()
+    assert any("1 % more" in texts and "mu" in texts for texts in texts_drawn)
     table = {r["parameter"]: r for r in rows_of(tmp_path / "out/sensitivity.csv")}
     assert code == 0 and float(table["mu"]["critical_level"]) == pytest.approx(27.437, rel=2e-5)
     assert {"rho_dam", "g", "K_N", "E_found"} <= table.keys()

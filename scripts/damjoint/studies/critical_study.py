@@ -60,12 +60,14 @@ def critical(
             raise answer.error
         lines = printed_lines(answer, search)
         if sensitivity and answer.point and answer.value is not None:
-            lines += ["", *derivative_lines(study.out, answer.point, sensitivity)]
+            lines += ["", *derivative_lines(case.name, study.out, answer.point, sensitivity)]
     return answer, lines
 
 
-def derivative_lines(out: Path, point: Point, names: Sequence[str]) -> list[str]:
-    """Write the derivatives of a critical level, and what is printed of them."""
+def derivative_lines(name: str, out: Path, point: Point, names: Sequence[str]) -> list[str]:
+    """Write the derivatives of a critical level and their picture, with the name of the case; what
+    is printed of them.
+    """
     try:
         rows = sensitivities.of_point(point, names)
     except RunError as error:
@@ -74,6 +76,8 @@ def derivative_lines(out: Path, point: Point, names: Sequence[str]) -> list[str]
         out / sensitivities.FILE, {n: np.array(v) for n, v in sensitivities.table(rows).items()}
     )
     changes = sensitivities.changes(rows, (("critical_level", "m", 1.0),))
+    case = replace(point.model.case, name=name)
+    sensitivities.draw_changes(changes, case, point.level, out)
     return [sensitivities.text(changes)]
 
 

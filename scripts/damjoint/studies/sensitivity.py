@@ -29,7 +29,7 @@ CONTINUOUS = ("crest_ux", "max_opening", "bonded_length", "N", "T", "M", "U", "x
 
 #: Those that are printed, as changes by one percent of a parameter: name, unit, factor.
 PRINTED = (
-    *(("crest_ux", "mm", 1e3), ("max_opening", "mm", 1e3)),
+    *(("crest_ux", "mm", 1e3), ("max_opening", "µm", 1e6)),
     *(("N", "MN/m", 1e-6), ("T", "MN/m", 1e-6)),
 )
 
@@ -146,9 +146,9 @@ def table(rows: Sequence[Sensitivity]) -> dict[str, list[Value]]:
     }
 
 
-def write(names: Sequence[str], results: Results, folder: Path) -> None:
-    """Write the derivatives of a run into its folder; what is printed of them is added to its
-    info.
+def write(names: Sequence[str], picture: bool, results: Results, folder: Path) -> None:
+    """Write the derivatives of a run into its folder, and their picture; what is printed of them is
+    added to its info.
     """
     try:
         rows = of_run(results.case, names)
@@ -156,7 +156,20 @@ def write(names: Sequence[str], results: Results, folder: Path) -> None:
         results.info["sensitivity"] = {"statement": str(error), "changes": []}
         return
     write_csv(folder / FILE, {n: np.array(v) for n, v in table(rows).items()})
-    results.info["sensitivity"] = {"statement": "", "changes": changes(rows, PRINTED)}
+    listed = changes(rows, PRINTED)
+    results.info["sensitivity"] = {"statement": "", "changes": listed}
+    if picture:
+        draw_changes(listed, results.case, rows[-1].level, folder)
+
+
+def draw_changes(
+    listed: Sequence[Mapping[str, Value]], case: Case, level: float, folder: Path
+) -> None:
+    """Draw changes at a level into the folder of a study of a case."""
+    from . import sensitivity_picture as picture
+
+    title = f"{case.title}: change by one percent of a parameter, level {level:.6g} m"
+    picture.draw(listed, title, folder / f"{case.name}{picture.ENDING}")
 
 
 def changes(
