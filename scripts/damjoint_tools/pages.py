@@ -123,7 +123,8 @@ def results_page() -> str:
         "Written with `--all-steps`, also by `damjoint quake`: for every update of the internal "
         "variables, in their order, a row per joint node and per integration point. Besides the "
         "converged steps these are the weight alone, the increments of an equilibrium path that "
-        "lead to a step, and the rounds of unstable crack growth. Numbers have all digits; "
+        "lead to a step, and the rounds of unstable crack growth; with `damjoint quake` also the "
+        "static state after the record. Numbers have all digits; "
         "`lambda` and `joint_thickness` as in joint.csv.",
         steps,
         "## curve.csv",

@@ -246,7 +246,8 @@ def at_points(joint: Shaken, steps: Table) -> tuple[list[Table], Table]:
     own = rows_where(steps, (steps["joint"] == joint.number + 1) & (steps["weight"] > 0))
     updates = split_by(own, "update")
     moving = [u for u in updates if u["earthquake"][0]]
-    return moving, updates[len(updates) - len(moving) - 1]
+    first = next(n for n, u in enumerate(updates) if u["earthquake"][0])
+    return moving, updates[first - 1]
 
 
 def forces_of(joint: Shaken, steps: Table) -> tuple[Array, Array]:

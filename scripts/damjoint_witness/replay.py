@@ -7,6 +7,7 @@ from copy import copy
 from math import hypot
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .files import Table, rows_where, split_by
 from .laws import LAWS
@@ -32,10 +33,7 @@ def laws(steps: Table, joints: Sequence[Values]) -> Iterator[str]:
 def law_of_joint(rows: Table, values: Values, prefix: str) -> Iterator[str]:
     """Check a joint: the first point that differs, and by how much the worst one does."""
     updates = split_by(rows, "update")
-    times = [(u["begin"][0], u["time"][0], bool(u["frozen"][0])) for u in updates]
-    for n, update in enumerate(updates):  # the time of an earthquake does not act on the joint
-        if update["earthquake"][0]:
-            times[n] = (times[n - 1][1], times[n - 1][1], False)
+    times = times_of(updates)
     names = ("delta_n", "delta_t1", "delta_t2", "sigma_n_eff", "tau_1", "tau_2", "damage", "slip")
     table = np.array([[u[name] for name in names] for u in updates])  # (updates, names, points)
     further = [name for name in ("lambda", "joint_thickness") if name in rows]
@@ -73,3 +71,34 @@ def law_of_joint(rows: Table, values: Values, prefix: str) -> Iterator[str]:
                     worst[name] = error, updates[n]["time"][0]
     for name, (error, time) in worst.items():
         yield f"{prefix}{name} off by {error:.3g} tolerances from the law at t = {time:g}"
+
+
+def times_of(updates: Sequence[Table]) -> list[tuple[float, float, bool]]:
+    """Beginning and end of the step of each update, and whether the damage was frozen; what acts on
+    the joint with time, works, does not go on in an earthquake and after it.
+    """
+    times = [(u["begin"][0], u["time"][0], bool(u["frozen"][0])) for u in updates]
+    shaken = False
+    for n, update in enumerate(updates):
+        shaken |= bool(update["earthquake"][0])
+        if shaken:
+            times[n] = (times[n - 1][1], times[n - 1][1], times[n][2])
+    return times
+
+
+def gaping(updates: Sequence[Table], values: Values) -> NDArray[np.bool_]:
+    """Whether each point of a joint belongs to the crack and is not closed, after each update
+    (updates, points), by the law.
+    """
+    names = ("delta_n", "delta_t1", "delta_t2")
+    jumps = np.array([[u[name] for name in names] for u in updates])
+    found = np.zeros((len(updates), jumps.shape[2]), bool)
+    times = times_of(updates)
+    for q in range(jumps.shape[2]):
+        point = LAWS[values["law"]](values)
+        history = jumps[:, :, q].tolist()
+        for n, (begin, end, frozen) in enumerate(times):
+            jump = (history[n][0], history[n][1], history[n][2])
+            point.step(jump, begin, end, frozen)
+            found[n, q] = point.gapes(jump)
+    return found

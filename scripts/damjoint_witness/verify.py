@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cached_property
 
-from . import earthquake, replay, statics, stops, tables, water
-from .files import Files, Table, read_table
+from . import earthquake, replay, statics, stops, tables, water, water_in_motion
+from .files import Files, Table, read_table, rows_where
 from .reader import Asked, read
 
 
@@ -37,17 +37,20 @@ class Witness:
 
     def _violations(self) -> Iterator[str]:
         files, asked, steps = self.files, self.asked, self.steps
+        still = rows_where(steps, steps["earthquake"] == 0)
         if asked.command == "quake":
             yield from earthquake.violations(self.shaken, steps)
+            yield from water_in_motion.violations(files, asked, steps)
         else:
             yield from tables.bookkeeping(files, asked)
             if asked.sections:  # else the balance of each body of the mesh, in elasticity
                 yield from statics.balance(files, asked)
-                yield from tables.integrals(files, asked, steps)
-            yield from tables.nodes(files, asked, steps)
-            yield from water.violations(files, asked, steps)
             if (files.folder / "fields").is_dir():
                 yield from self._elasticity()
+        if asked.sections:
+            yield from tables.integrals(files, asked, still)
+        yield from tables.nodes(files, asked, still)
+        yield from water.violations(files, asked, steps)
         yield from replay.laws(steps, asked.joints)
 
     def _elasticity(self) -> Iterator[str]:

@@ -636,7 +636,8 @@ def line(joint: JointState) -> Heads:
 def states(files: Files, asked: Asked, steps: Table) -> Iterator[tuple[float, list[JointState]]]:
     """Yield at each requested time the number of its update and the joints."""
     for table in files.joint_tables:
-        update = update_at(steps, table["time"][0], table["level"][0])
+        still = rows_where(steps, steps["earthquake"] == 0)
+        update = update_at(still, table["time"][0], table["level"][0])
         tail = float(steps["tail_level"][steps["update"] == update][0])
         joints = []
         for k in range(len(asked.joints)):

@@ -39,6 +39,7 @@ def test_there_are_scenes_in_which_a_mutation_matters(name, tmp_path):
                 ("mu of the first joint in all laws", "from the law"),
                 ("order of the levels", "level is off"),
                 ("damping by the mass x 1.1", "momentum"),
+                ("no water in a crack that has closed", "of the earthquake"),
             )
         ),
     ],

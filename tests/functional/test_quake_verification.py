@@ -21,6 +21,7 @@ from damjoint_tools import (
 )
 from damjoint_tools.random_quakes import RandomQuake, random_quake
 from damjoint_witness import earthquake as witness_of_quakes
+from damjoint_witness import water_in_motion
 from damjoint_witness.files import Files, read_table
 from damjoint_witness.verify import Witness
 from quakes import BLOCK, DAM, earthquake, mean_slip, smooth_record, write_record
@@ -31,7 +32,8 @@ def verified_quake(settings, level, record, folder):
     scene = RandomQuake(settings, level, "0", 1, np.zeros((0, 3)), record)
     case = load("dam", settings, level, "0", 1, record=record)
     quake_study.run(replace(case, all_steps=True), folder, Options(picture=False, progress=False))
-    return Witness(Files(folder, tuple(scene.words)))
+    files = Files(folder, tuple(scene.words))
+    return Witness(replace(files, exit_code=int("broken" in files.record["verdict"])))
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +124,42 @@ def altered(files, folder, table, column, change):
     columns[column] = change(columns[column])
     write_csv(folder / f"{table}.csv", columns, EXACT)
     return Witness(replace(files.files, folder=folder)).violations()
+
+
+RUPTURE = {"law": "rupture", "sigma_max": 2e5}
+LIFT = {"lift_heights": (20.0,), "uplift": ("flow", "cracked")}
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        RUPTURE | {"quake_uplift": "zero"},
+        {"uplift": "flow", "quake_uplift": "crack"},
+        pytest.param(LIFT | {"quake_uplift": "zero"}, marks=pytest.mark.heavy),
+        pytest.param(LIFT | {"quake_uplift": "crack"}, marks=pytest.mark.heavy),
+        pytest.param({"uplift": "cracked", "quake_uplift": "unchanged"}, marks=pytest.mark.heavy),
+    ],
+)
+def test_the_water_of_every_step_follows_from_the_openings(tmp_path, settings):
+    """By each rule; of another rule the pressure is wrong, while the joint opens and closes."""
+    record = smooth_record(tmp_path / "wave.csv", 6.0, duration=0.4)
+    run = verified_quake(DAM | settings | {"record_rest": 0.1}, "35", record, tmp_path / "out")
+    assert run.violations() == []
+    other = "unchanged" if settings["quake_uplift"] != "unchanged" else "crack"
+    joints = tuple({**values, "quake_uplift": other} for values in run.asked.joints)
+    found = water_in_motion.violations(run.files, replace(run.asked, joints=joints), run.steps)
+    assert any("Pa at t = " in words for words in found)
+
+
+@pytest.mark.parametrize("column", ["delta_n", "tau_1", "p"])
+def test_the_state_after_an_earthquake_is_in_the_table_of_all_steps(files, column):
+    """The last row is that of the static state, after the time steps; each table of it agrees."""
+    steps, still = files.steps, files.files.joint_tables[-1]
+    last = steps["update"] == steps["update"].max()
+    assert not steps["earthquake"][last].any() and (steps["time"][last] == 2).all()
+    nodes = last & (steps["weight"] == 0)
+    scale = np.abs(still[column]).max()
+    assert np.sort(steps[column][nodes]) == pytest.approx(np.sort(still[column]), abs=1e-9 * scale)
 
 
 @pytest.mark.parametrize(

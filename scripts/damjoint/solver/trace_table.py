@@ -14,25 +14,31 @@ from ..model.results import step_columns
 from .state import Trace
 
 
-def trace_table(equilibrium: Equilibrium, trace: Trace, earthquake: Sequence[float] = ()) -> Table:
+def trace_table(
+    equilibrium: Equilibrium, trace: Trace, earthquake: Sequence[float] = (), static: int = 0
+) -> Table:
     """The table of all updates, see `step_columns`.
 
-    earthquake: times [s] of its steps, which are the last updates.
+    earthquake: times [s] of its steps; static: number of updates before it. Those after it are of
+    the static equilibrium, by whose number in history.csv they are known.
     """
     updates, columns = trace.updates, step_columns(equilibrium.case)
-    static = len(updates) - len(earthquake)
-    times = [update.state.time for update in updates[:static]] + list(earthquake)
+    end = static + len(earthquake)
+    times = [update.state.time for update in updates]
+    times[static:end] = earthquake
+    if earthquake:
+        times[end:] = [len(equilibrium.case.levels) + 1.0] * (len(updates) - end)
     blocks = []
     for number, (update, time) in enumerate(zip(updates, times, strict=True)):
-        state = update.state
+        state, moving = update.state, static <= number < end
         of_step = {
             "update": number + 1,
-            "begin": update.begin if number < static else times[number - 1] * (number > static),
+            "begin": times[number - 1] * (number > static) if moving else update.begin,
             "time": time,
             "level": state.loading.level,
             "tail_level": state.loading.tail,
             "frozen": update.frozen,
-            "earthquake": number >= static,
+            "earthquake": moving,
         }
         for k, joint in enumerate(equilibrium.interface.joints):
             law, nodes, points = equilibrium.laws.laws[k], joint.rows, joint.points

@@ -34,7 +34,7 @@ from ..solver.controls import LevelControl
 from ..solver.history import joint_row
 from ..solver.load_stepper import LoadStepper
 from ..solver.model import Model, StepResult
-from ..solver.state import State
+from ..solver.state import State, Trace
 from ..solver.trace_table import trace_table
 from ..statics.statement import statement
 from . import quake_summary
@@ -135,11 +135,11 @@ class QuakeRun:
         quake, static = self.quake, self.static
         summary = self.summary()
         summary["seconds"] = {name: round(value, 3) for name, value in self.seconds.items()}
-        after = self.static_state_after()
+        after, trace = self.static_state_after(), quake.now.state.trace
         summary["after"] = {"equilibrium": after is not None}
         if after is not None:
             number = len(quake.case.levels) + 1.0
-            state = replace(after.state, time=number)
+            state, trace = replace(after.state, time=number), after.state.trace
             static.history.add(replace(after, state=state), 0)
             static.history.save(state)
             last = static.history.last
@@ -148,14 +148,14 @@ class QuakeRun:
         full = self.stands_with_full_uplift()
         if full is not None:
             summary["after"]["equilibrium_with_full_uplift_in_the_crack"] = full
-        return self._result_of(summary)
+        return self._result_of(summary, trace)
 
     def result_so_far(self, error: BaseException | None = None) -> QuakeResult:
         """The result up to now, or up to an error or interrupt."""
         self.history.end_at_complete_row(self.quake)
         where = f" after t = {self.quake.now.time:.6g} s of the record"
         end = end_of(error, where) if error else (RUNNING, f"{RUNNING}{where}")
-        return self._result_of(self.summary(), end, error)
+        return self._result_of(self.summary(), self.quake.now.state.trace, end, error)
 
     def summary(self) -> dict[str, Any]:
         """See `quake_summary`, of the rows so far; with the slip of the rigid blocks, but
@@ -173,16 +173,19 @@ class QuakeRun:
     def _result_of(
         self,
         summary: dict[str, Any],
+        trace: Trace | None,
         end: tuple[str, str] = ("", ""),
         error: BaseException | None = None,
     ) -> QuakeResult:
-        """The result with a summary; end: state and message before the end of the record; error:
-        that ended it early.
+        """The result with a summary; trace: of the last state; end: state and message before the
+        end of the record; error: that ended it early.
         """
         quake, history, static = self.quake, self.history, self.static.results()
-        if trace := quake.now.state.trace:
+        before = quake.problem.static.trace
+        if trace and before:
             equilibrium = quake.problem.model.equilibrium
-            static.steps = trace_table(equilibrium, trace, history.rows["time"])
+            times = history.rows["time"]
+            static.steps = trace_table(equilibrium, trace, times, len(before.updates))
         seconds = {name: value for name, value in self.seconds.items() if name != "steps"}
         static.info |= about(quake.problem.model.equilibrium.bulk) | {"wall_seconds": seconds}
         return QuakeResult.of(

@@ -81,6 +81,10 @@ class Bond(Point):
         """See `Point`."""
         return damage_after(self.xi, self.curve)
 
+    def gapes(self, jump: Jump) -> bool:
+        """See `Point`: open, without the tension of linear softening."""
+        return jump[0] > 0 and (self.xi >= 1 or not self.f_t)
+
     def slip(self) -> float:
         """See `Point`."""
         return hypot(*self.s)

@@ -85,6 +85,10 @@ class Endo(Point):
         """See `Point`."""
         return self.alpha
 
+    def gapes(self, jump: Jump) -> bool:
+        """See `Point`: in tension, and open by more than where linear softening would end."""
+        return jump[0] > max(self.p[0], 2 * self.G / self.f_t)
+
     def slip(self) -> float:
         """See `Point`: the tangential part of the plastic jump."""
         return hypot(self.p[1], self.p[2])

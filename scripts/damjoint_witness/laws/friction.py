@@ -48,6 +48,10 @@ class Friction(Point):
         """See `Point`: 1 where open."""
         return float(self.opening(jump) > self.cap)
 
+    def gapes(self, jump: Jump) -> bool:
+        """See `Point`: beyond the largest tension."""
+        return self.opening(jump) > self.cap
+
     def jumping(self, jump: Jump) -> float:
         """See `Point`."""
         return abs(self.opening(jump) - self.cap)

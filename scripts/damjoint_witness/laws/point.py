@@ -35,6 +35,10 @@ class Point:
         """The damage, 0 to 1."""
         raise NotImplementedError
 
+    def gapes(self, jump: Jump) -> bool:
+        """Whether it belongs to the crack and is not closed."""
+        raise NotImplementedError
+
     def slip(self) -> float:
         """Size of the slip [m]."""
         raise NotImplementedError

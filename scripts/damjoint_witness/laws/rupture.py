@@ -94,6 +94,11 @@ class Rupture(Point):
             return 1.0
         return self.lost(self.kappa) if self.L_C else 0.0
 
+    def gapes(self, jump: Jump) -> bool:
+        """See `Point`: open, after an opening where linear softening ends."""
+        opening = self.opening(jump)
+        return opening > 0 and (max(opening, self.kappa) >= self.L_C or self.sawn > 0)
+
     def slip(self) -> float:
         """See `Point`."""
         return hypot(*self.released)
