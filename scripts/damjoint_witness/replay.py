@@ -39,7 +39,7 @@ def law_of_joint(rows: Table, values: Values, prefix: str) -> Iterator[str]:
     further = [name for name in ("lambda", "joint_thickness") if name in rows]
     extra = np.array([[u[name] for name in further] for u in updates])
     worst: dict[str, tuple[float, float]] = {}
-    column = max(values["rho_dam"], values["rho_water"]) * values["g"] * values["dam_height"]
+    weight = max(values["rho_dam"], values["rho_water"]) * values["g"] * values["dam_height"]
     for q in range(table.shape[2]):
         point = LAWS[values["law"]](values)
         history = table[:, :, q].tolist()
@@ -53,7 +53,7 @@ def law_of_joint(rows: Table, values: Values, prefix: str) -> Iterator[str]:
             exact = after.traction(jump)
             size = point.K_N * abs(jump[0]) + point.K_T * hypot(jump[1], jump[2])
             room = TOLERANCE * point.strength(exact[0]) + ROUNDING * (size + abs(row[3]))
-            room += NOTHING * column
+            room += NOTHING * weight
             errors = {
                 "normal stress": abs(row[3] - exact[0]) / room,
                 "shear stress": hypot(row[4] - exact[1], row[5] - exact[2]) / room,

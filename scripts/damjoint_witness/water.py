@@ -412,13 +412,14 @@ class Network:
 
     @cached_property
     def branched(self) -> bool:
-        """Whether it is more than one way from heel to toe."""
+        """Whether it is more than one way, in 3D surface, from heel to toe."""
         heels, toes = self.ends
         if self.first.values["dim"] == 3:
-            return not (len(heels) and len(toes))
+            meet = self.most_at_edges > 2 or len(self.dead_ends)
+            return bool(meet or not (len(heels) and len(toes)))
         if not len(heels) == len(toes) == 1:
             return True
-        return self.first.values["dim"] == 2 and bool((self.degrees > 2).any() or self.dead_ends)
+        return bool((self.degrees > 2).any() or len(self.dead_ends))
 
     @cached_property
     def degrees(self) -> IntArray:
@@ -427,9 +428,25 @@ class Network:
         return np.bincount(np.concatenate(tables))
 
     @property
-    def dead_ends(self) -> int:
-        """Number of ends at a joint that water does not pass, in 2D."""
-        return int((self.degrees == 1).sum()) - sum(map(len, self.ends))
+    def most_at_edges(self) -> int:
+        """The largest number of elements at an edge of one, in 3D."""
+        tables = [table for tables in self.tables for table in tables]
+        edges = [np.stack([t, np.roll(t, -1, axis=1)], axis=2).reshape(-1, 2) for t in tables]
+        same = np.sort(np.concatenate(edges), axis=1)
+        return int(np.unique(same, axis=0, return_counts=True)[1].max())
+
+    @cached_property
+    def dead_ends(self) -> IntArray:
+        """Nodes at heel or toe of a joint that end at a joint that water does not pass."""
+        inner = list[IntArray]()
+        for k, joint in enumerate(self.joints):
+            own = self.nodes_of(k)
+            s = joint.rows["s"][joint.find(self.nodes[own])]
+            inner.append(own[(s - s.min() < SAME_PLACE) | (s.max() - s < SAME_PLACE)])
+        of_joints = np.concatenate([self.nodes_of(k) for k in range(len(self.joints))])
+        alone = np.bincount(of_joints, minlength=len(self.nodes)) == 1
+        found = np.unique(np.concatenate(inner))
+        return np.setdiff1d(found[alone[found]], np.concatenate(self.ends))
 
     def fixed(self) -> tuple[dict[int, float], set[int]]:
         """Return the heads [m] at the ends, and those ends where water leaves but does not
@@ -446,7 +463,7 @@ class Network:
         heads = {int(n): max(heights[n], level) for nodes, level in levels for n in nodes}
         dry = {n for n in heads if heads[n] <= heights[n]}
         if len(dry) == len(heads):
-            lowest = heights[self.degrees == 1].min()
+            lowest = heights[[*heels, *toes, *self.dead_ends]].min()
             rest = float(min(lowest, max(first.level, first.tail)))
             return dict.fromkeys(range(len(heights)), rest), set()
         return heads, dry
@@ -544,7 +561,10 @@ class Network:
             slopes = np.einsum("mqax,ma->mqx", gradients(sides, u), self.heads[table])
             along = slopes[..., :2] @ state.along
             means = -share * (cube * along) @ w / w.sum()
-            at_toe = np.isin(np.arange(len(self.nodes)), self.ends[1]).astype(float)[table]
+            own = self.nodes_of(joint)
+            along_joint = state.rows["s"][state.find(self.nodes[own])]
+            toe = own[along_joint.max() - along_joint < SAME_PLACE]
+            at_toe = np.isin(np.arange(len(self.nodes)), toe).astype(float)[table]
             tested = np.einsum("mqax,ma->mqx", gradients(sides, u), at_toe)
             products = np.einsum("mqx,mqx->mq", slopes, tested) * cube
             leakage = float(-share * np.sum(products @ w * sides.measures))

@@ -2,6 +2,7 @@
 
 By `quake_uplift`, section 5 and 11 of reference/theory.md: that of the static state, of the
 openings at the beginning of the step, or none in the elements of the crack that are open then.
+Water in motion (`transient`) is not computed again.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ def violations(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
     in 3D of an earthquake with fields, which have the elements of the joints.
     """
     first = asked.joints[0]
-    if first["dim"] == 3 and not (files.folder / "fields").is_dir():
+    rule = first["quake_uplift"]
+    if rule == "transient" or (first["dim"] == 3 and not (files.folder / "fields").is_dir()):
         return
     at_rest = next(
         joints
@@ -48,8 +50,7 @@ def violations(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
     moving = [n for n, update in enumerate(updates[0]) if update["earthquake"][0]]
     if not moving:
         return
-    rule, last = first["quake_uplift"], moving[0] - 1
-    static = pressures(at_rest, [of_joint[last] for of_joint in updates])
+    static = pressures(at_rest, [of_joint[moving[0] - 1] for of_joint in updates])
     flows = rule == "crack" and any(joint["uplift"] in FLOWING for joint in asked.joints)
     dry = (
         [without_water(joint, of_joint) for joint, of_joint in zip(at_rest, updates, strict=True)]

@@ -135,6 +135,34 @@ def test_other_values_of_the_water_are_noticed(written, change):
     assert found(water, folder, (*words, "--set", change))
 
 
+@pytest.mark.parametrize(
+    "uplift, level, tail",
+    [
+        ("flow", 12, 3),
+        *(
+            pytest.param(*scene, marks=pytest.mark.heavy)
+            for scene in [
+                ("flow", 8, 3),
+                ("flow,flow,none", 8, 3),
+                ("cracked,flow,cracked", 12, 0),
+                ("imposed", 8, 12),
+            ]
+        ),
+    ],
+)
+def test_water_where_joints_meet_in_3d(tmp_path, uplift, level, tail):
+    """Two or three joints at a line, each with its own aperture, also with a dry end; water of
+    another aperture is noticed.
+    """
+    words = f"run ssnp143 --set dim=3 --set uplift={uplift} --set aperture_min=1e-4,2e-4,3e-4 "
+    words += f"--levels {level} --tail-levels {tail}"
+    cli.main([*words.split(), "--no-picture", "--all-steps", "--out", str(tmp_path)])
+    assert found(water, tmp_path, tuple(words.split())) == []
+    if "flow" in uplift:
+        other = words.replace("2e-4", "4e-4")
+        assert any("p off" in text for text in found(water, tmp_path, tuple(other.split())))
+
+
 def test_elimination_in_a_network_is_exact_for_any_conductances():
     """Three lines from a node, one of them closed: the head by hand."""
     graph = water.Graph(np.array([[0, 3], [1, 3], [2, 3]]), np.array([1e18, 1.0, 3.0]), 4)
