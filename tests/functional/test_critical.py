@@ -463,10 +463,13 @@ def test_a_trial_that_is_crushed_at_once_fails(command):
 SNAP_BACKS = [
     {"n_joint": 20.0, "law": "bond", "uplift": "flow", "sigma_max": 25e3, "adhesion": 188e3}
     | {"mu": 0.91, "G_f": 45.5, "G_t": 193.2},
-    {"dam_height": 85.21, "dam_base": 57.38, "dam_crest": 6.745, "n_joint": 20.0, "law": "bond"}
-    | {"E_dam": 1.662e10, "E_found": 7.978e9, "nu_dam": 0.1987, "K_N": 1.288e11}
-    | {"K_T": 1.223e11, "mu": 0.844, "adhesion": 34380.0, "sigma_max": 538900.0}
-    | {"uplift": "drained", "drain_x": 5.738, "G_f": 118.9, "G_t": 151.2},
+    pytest.param(
+        {"dam_height": 85.21, "dam_base": 57.38, "dam_crest": 6.745, "n_joint": 20.0, "law": "bond"}
+        | {"E_dam": 1.662e10, "E_found": 7.978e9, "nu_dam": 0.1987, "K_N": 1.288e11}
+        | {"K_T": 1.223e11, "mu": 0.844, "adhesion": 34380.0, "sigma_max": 538900.0}
+        | {"uplift": "drained", "drain_x": 5.738, "G_f": 118.9, "G_t": 151.2},
+        marks=pytest.mark.heavy,
+    ),
     pytest.param(  # long increments on a straight part of the path
         {"dam_height": 108.6, "dam_base": 71.03, "dam_crest": 9.12, "n_joint": 40.0, "law": "bond"}
         | {"E_dam": 1.613e10, "E_found": 4.171e10, "nu_dam": 0.1909, "nu_found": 0.2249}
@@ -554,6 +557,7 @@ def test_the_level_may_rise_in_the_last_interval_as_steeply_as_before_it():
     assert curve.bound(0) == pytest.approx(140.88)  # its chord is the steepest slope known
 
 
+@pytest.mark.heavy
 def test_a_path_begins_as_a_run_where_single_steps_do_not_lead(monkeypatch):
     monkeypatch.setattr(FailurePath, "by_level", lambda self, point, length: [])
     search, answer = search_result("dam", settings=RUPTURE | NO_TENSION, levels="20")
