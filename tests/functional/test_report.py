@@ -10,6 +10,7 @@ import re
 import shutil
 import sys
 
+import damjoint as dj
 import numpy as np
 import pytest
 from damjoint import cli, runner
@@ -482,6 +483,17 @@ def test_pages_of_the_report_as_pdf(command, checked, page_of_check, tmp_path, m
         assert ends[max(ends)] not in ("h2", "h3")
         if number < len(pages) - 1:
             assert max(ends) > bottom / 2
+
+
+def test_the_caption_of_maps_of_a_joint_has_no_colors_of_curves():
+    def captions(name, **settings):
+        solution = dj.run(dj.case(name, n_joint=6, h_dam=15, h_found=60, **settings)).solution
+        time = solution.result.last["time"]
+        return [caption for _, caption, _ in report.drawn(solution, time, "at level 40 m")]
+
+    valley = captions("valley", levels=[40.0])
+    assert "Joint at level 40 m." in valley and not [text for text in valley if "Red" in text]
+    assert any(text.startswith("Joint at level 40 m. Red: broken") for text in captions("dam"))
 
 
 def test_a_pdf_whose_pictures_are_not_whole_is_not_written(command, checked, monkeypatch):

@@ -502,7 +502,7 @@ def panels_of_joints(result: Results) -> list[Panel]:
         first = decisive_joint(result)
         order.sort(key=lambda k: (k != first, k))
         colors = [BLUE] + [GREY] * (len(joints) - 1)
-        others = {first: names[first], order[1]: "the other joints"}
+        others = {first: names[first], order[1]: "others"}
         names = tuple(others.get(k, "_") for k in range(len(joints)))
 
     def lines(values: Callable[[Results], np.ndarray]) -> list[tuple[np.ndarray, str, str]]:

@@ -562,13 +562,13 @@ def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str,
     """Yield the figures of a run: CSS class of the size, caption, figure."""
     result = solution.result
     several = len(result.joints) > 1
-    colors = "Red: broken; violet: softening; orange: slipped."
     has_fields = bool(solution.fields)
     if has_fields:
         section = figure_of(*HALF)
         run_picture.draw_dam(section, solution, time)
         yield "half", f"Section and loads {at_level}, deformed.", section
     maps = has_fields and run_picture.is_own_solid(result.case)
+    colors = "" if maps else " Red: broken; violet: softening; orange: slipped."
     rows = several and not maps
     changes = len(np.unique(result.history["level"])) > 1  # else a single point or line
     if rows and has_fields and changes:
@@ -577,7 +577,7 @@ def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str,
     joint = figure_of(*size)
     run_picture.draw_all_joints(joint, solution, time)
     place = "half" if size is HALF else "full"
-    yield place, f"Joint{'s' if several else ''} {at_level}. {colors}", joint
+    yield place, f"Joint{'s' if several else ''} {at_level}.{colors}", joint
     if changes and not (rows and has_fields):
         yield "full", "", history_of(result, WIDE)
     if result.case["dim"] == 3 and has_fields and not run_picture.is_own_solid(result.case):
