@@ -144,7 +144,9 @@ def above(critical: Critical, files: Files, asked: Asked, steps: Table) -> Itera
         return
     beyond = replace(asked, levels=(ABOVE / BELOW * asked.levels[-1],))
     verdict = f"{critical.mode} on {critical.joint}" if critical.joint else critical.mode
-    joints = stops.failing(files, beyond, steps, verdict)
+    # the search omits the hardening that a case does not ask for
+    plastic = steps | {"lambda": 0 * steps["lambda"]} if "lambda" in steps else steps
+    joints = stops.failing(files, beyond, plastic, verdict)
     if all(map(stops.equilibrium_is_certain, joints)):
         yield f"above the critical level {critical.level:.6g} m there certainly is an equilibrium"
     by_friction = critical.mode == "sliding" and all(map(has_constant_strength, joints))
