@@ -43,6 +43,7 @@ def test_random_histories_are_replayed(name, with_frozen):
             **dict(zip(("sigma_n_eff", "tau_1", "tau_2"), traction.T, strict=True)),
             "damage": law.damage(jump, variables),
             "slip": law.slip(variables, number),
+            **law.column_values(variables),
         }
         blocks.append(columns)
     steps = {column: np.concatenate([block[column] for block in blocks]) for column in blocks[0]}
