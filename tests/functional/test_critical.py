@@ -261,7 +261,8 @@ def test_a_limit_without_a_mechanism_is_not_confirmed(monkeypatch, command):
     ends = lambda self, last: vars(self).update(ended=True)
     monkeypatch.setattr(FailurePath, "pass_over", ends)
     code, out, _ = command("critical", "c", "--set", "pena_tang=0", "--levels", "6,8")
-    assert code == 3 and "critical level 6 m, not confirmed: between 6 and 6.25 m" in out
+    # the interval has the highest levels of all three repetitions
+    assert code == 3 and "critical level 6 m, not confirmed: between 6 and 6.625 m" in out
 
 
 @pytest.mark.parametrize(
@@ -491,6 +492,26 @@ SNAP_BACKS = [
         | {"sigma_max": 47770.0, "alpha": 2.0, "pena_rupture": 6.643},
         marks=pytest.mark.heavy,
     ),
+    pytest.param(  # a wet crack of which the branch ends at its highest level
+        {"dam_height": 24.6, "dam_base": 20.57, "dam_crest": 3.06, "n_joint": 20.0, "law": "bond"}
+        | {"E": 2.28e10, "E_found": 1.837e10, "nu": 0.1566, "K_N": 5.154e10, "K_T": 1.469e11}
+        | {"mu": 0.7297, "uplift": "cracked", "sigma_max": 42520.0, "adhesion": 396400.0}
+        | {"G_f": 59.06, "G_t": 447.6},
+        marks=pytest.mark.heavy,
+    ),
+    pytest.param(  # a wet crack that a displacement closes again, which filling does not
+        {"dam_height": 54.78, "dam_base": 48.51, "dam_crest": 9.61, "n_joint": 20.0}
+        | {"law": "friction", "E": 2.883e10, "E_found": 2.329e10, "nu": 0.2422, "K_N": 5.345e10}
+        | {"K_T": 7.257e10, "mu": 1.072, "uplift": "cracked", "adhesion": 192800.0},
+        marks=pytest.mark.heavy,
+    ),
+    pytest.param(  # a law that hardens before it softens
+        {"dam_height": 19.84, "dam_base": 18.09, "dam_crest": 3.4, "n_joint": 20.0, "law": "endo"}
+        | {"E": 1.79e10, "E_found": 1.401e10, "nu": 0.1949, "K_N": 2.242e11, "K_T": 1.34e11}
+        | {"mu": 0.6469, "uplift": "cracked", "sigma_max": 21910.0, "adhesion": 18560.0}
+        | {"G_f": 54.17},
+        marks=pytest.mark.heavy,
+    ),
 ]
 
 
@@ -578,6 +599,35 @@ def test_a_highest_level_that_depends_on_the_increments_is_not_confirmed(monkeyp
     assert not answer.confirmed
     lines = "\n".join(printed_lines(answer, search))
     assert "not confirmed: between 48 and 49 m, depending on" in lines
+
+
+def half(self, verified):
+    """In place of a path by shorter increments: the first half of this one."""
+    other = self.copied()
+    del other.points[len(other.points) // 2 :]
+    other.ended = True
+    return other
+
+
+@pytest.mark.parametrize("law", ["friction", "bond"])
+def test_sliding_is_repeated_by_shorter_increments_where_the_law_has_a_history(monkeypatch, law):
+    settings = DAM | {"law": law, "mu": 0.6, "adhesion": 0.0, "sigma_max": 0.0}
+    search, answer = search_result("dam", settings=settings)
+    assert search.trials[-1].path.slides and answer.mode == "sliding" and answer.confirmed
+    monkeypatch.setattr(FailurePath, "by_shorter", half)
+    _, answer = search_result("dam", settings=settings)
+    assert answer.confirmed == (law == "friction")
+
+
+def test_the_interval_has_the_highest_level_of_every_path(monkeypatch):
+    """Each path by shorter increments ends lower than the one before."""
+    monkeypatch.setattr(FailurePath, "by_shorter", half)
+    monkeypatch.setattr(Search, "after_growth", lambda self, path: ({}, path))
+    search, answer = search_result("dam", settings=SNAP_BACKS[0])
+    low, high = search.trials[-1].path.interval
+    assert low == pytest.approx(answer.value) and low < high - 1
+    assert high == pytest.approx(48.4725, rel=path.PRECISION)
+    assert f"between {low:.6g} and {high:.6g} m" in answer.doubt
 
 
 def test_the_first_unstable_growth_of_a_law_without_friction_is_the_critical_level():

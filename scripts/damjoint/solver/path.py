@@ -359,7 +359,8 @@ class EquilibriumPath:
         self.rise = RISE
         #: the next increment, over what the joints moved in the last one
         self.growth = 1.0
-        #: the last two estimates of the highest level [m], where they differ, see `repeated`
+        #: the lowest and the highest of the highest levels [m] of the paths that have led to this
+        #: one by shorter increments, where they differ, see `repeated`
         self.interval = np.nan, np.nan
         #: the longest increment [m]
         self.longest = np.inf
@@ -376,10 +377,10 @@ class EquilibriumPath:
     @property
     def ends_at_strength(self) -> bool:
         """Whether all strength of a joint is used at its highest level, and no way on is left."""
-        return self.ends and self.points[self.top].slipping is not None
+        return self.stops and self.points[self.top].slipping is not None
 
     @property
-    def ends(self) -> bool:
+    def stops(self) -> bool:
         """Whether increments have led to its highest level, and none leads on."""
         stops = self.ended and not self.exhausted and bool(self.points)
         return stops and self.points[self.top].control != "level"
@@ -675,12 +676,22 @@ class EquilibriumPath:
             return None
         for verified in (False, True):
             again = self.by_shorter(verified)
-            ends = sorted((float(again.highest), float(self.highest)))
-            if ends[1] - ends[0] <= PRECISION / 2 * ends[1]:
+            if not self.widen(again, PRECISION / 2):
                 return None
         again.longest = np.inf
-        again.interval = ends[0], ends[1]
+        again.interval = self.interval
         return again
+
+    def widen(self, other: EquilibriumPath, precision: float) -> bool:
+        """Whether the highest level of another path differs by more than a relative precision; the
+        interval of this one then contains both.
+        """
+        ends = [float(self.highest), float(other.highest)]
+        if max(ends) - min(ends) <= precision * max(ends):
+            return False
+        known = [*ends, *self.interval]
+        self.interval = float(np.nanmin(known)), float(np.nanmax(known))
+        return True
 
     def by_shorter(self: P, verified: bool) -> P:
         """The path with shorter increments from before its highest level to beyond it."""

@@ -24,7 +24,7 @@ from ..input.values import flows_in_time
 from ..joint.interface import interface_of
 from ..model.results import Results, row_of_joint
 from ..session import end_of
-from ..solver.path import PRECISION, RISE, ROUGH, SURE, Point
+from ..solver.path import FALL, PRECISION, RISE, ROUGH, SURE, Point
 from ..statics.statement import words_of_bound
 from ..statics.verdict import bound, highest_by_statics
 from ..threads import limited_threads
@@ -284,19 +284,24 @@ class Search:
             result = replace(result, mode="sliding", why=slips_whole(path), doubt="")
         elif not result.why and path.falls:
             result = replace(result, why=lost_beyond_limit(path), doubt="")
-        elif not result.why and path.ends:
+        elif not result.why and path.stops:
             result = replace(result, why=end_of_branch(path), doubt="")
         if path.begun_by_run and point is path.points[0]:
             result = replace(result, why="", doubt=falls_at_once(point))
         if path.water_withdraws:
-            result = replace(result, why="", doubt=withdrawn(path))
+            fallen = path.points[-1].level < (1 - FALL) * path.highest
+            ends = fallen and not path.leads_higher
+            why, doubt = (withdrawn(path), "") if ends else ("", withdrawn(path))
+            result = replace(result, why=why, doubt=doubt)
         return result if certain else replace(result, why="", doubt=by_increments(other or path))
 
     def repeated(self, path: FailurePath) -> FailurePath | None:
         """A path by shorter increments: from before its highest level, if its branch has led there;
-        else, from the beginning on. None if they lead to the same highest level.
+        else, and where water enters the crack and no mechanism is found, from the beginning on.
+        None if they lead to the same highest level.
         """
-        if path.starts and path.top >= path.starts[0]:
+        lost = path.entering and (path.stops or path.water_withdraws)
+        if lost or (path.starts and path.top >= path.starts[0]):
             return self.from_beginning(path)
         other = path.repeated()
         if other:
@@ -318,9 +323,9 @@ class Search:
         if to_growth and other.starts:
             other = other.first_branch()
         other.refine()
-        low, high = sorted((float(path.highest), float(other.highest)))
-        other.interval = low, high
-        return None if high - low <= PRECISION * high else other
+        differs = path.widen(other, PRECISION)
+        other.interval = path.interval
+        return other if differs else None
 
     def after_growth(self, path: FailurePath) -> tuple[dict[str, float], FailurePath]:
         """The highest levels [m] that are reached after the unstable crack growth that ends a path,

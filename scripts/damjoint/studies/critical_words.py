@@ -51,7 +51,8 @@ def withdrawn(path: FailurePath) -> str:
     """What is said of a path on which the water leaves the crack."""
     return (
         f"at {path.points[-1].level:.6g} m points of the crack close again and part its water from "
-        "the reservoir: the equilibria beyond it have less uplift than an open crack"
+        "the reservoir: the equilibria beyond it have less uplift than an open crack, and no path "
+        "leads on at a level just above the highest one"
     )
 
 

@@ -89,6 +89,8 @@ class FailurePath(EquilibriumPath):
         stepper = LoadStepper(case, interface)
         #: whether it begins where only a run has found an equilibrium
         self.begun_by_run = False
+        #: whether relaxation has reached a higher level from which no path leads on, see `fill_on`
+        self.leads_higher = False
         #: the part of a joint that may open or soften before a displacement is prescribed
         self.most_softened = SOFTENED * rise / RISE
         #: whether the loads of a time are those of the last one, but for the level
@@ -178,8 +180,10 @@ class FailurePath(EquilibriumPath):
 
     @property
     def ends(self) -> bool:
-        """See `EquilibriumPath.ends`; where water enters the crack another element may follow."""
-        return super().ends and not self.entering
+        """Whether its branch ends at the highest level; where water enters the crack another
+        element may follow.
+        """
+        return self.stops and not self.entering
 
     @property
     def crushed(self) -> bool:
@@ -258,10 +262,31 @@ class FailurePath(EquilibriumPath):
         """
         while not (self.ended or self.decided(factor)):
             self.advance()
+            if self.water_withdraws and not self.to_growth:
+                self.fill_on()
             if self.to_growth and self.top + 1 < len(self.points):
                 self.refine(self.points[-1].level / (1 - FALL))  # how far it falls
         if not self.reached:
             self.refine(self.target)
+
+    def fill_on(self) -> None:
+        """Continue from the highest level as filling does, which does not let the water out: by
+        relaxation at a level higher by the precision, if others follow that equilibrium.
+        """
+        other = self.copied()
+        del other.points[self.top + 1 :]
+        other.starts = [number for number in self.starts if number <= self.top]
+        other.relaxes, other.ended = True, False
+        other.pass_over(other.points[-1])
+        if other.ended:
+            return
+        other.relaxes = False
+        other.advance()
+        self.leads_higher = other.ended
+        if not other.ended:
+            self.points, self.starts, self.closed = other.points, other.starts, other.closed
+            self.growth, self.over, self.crawled = other.growth, other.over, other.crawled
+            self.ended = False
 
     def decided(self, factor: float) -> bool:
         """Whether the target is reached, or the dam slides, is crushed or its level has settled; or
