@@ -250,6 +250,7 @@ class Search:
         below = last < len(self.case.levels)
         case = varied(self.case, self.settings, levels, tails) if below else self.base
         path = self.path(max(case.levels), case, case.highest_level, to_growth=True)
+        paths = list[FailurePath]()
         for _ in range(MOST_REPEATED):
             path.refine()  # first: a limit point that is known is confirmed sooner
             path.follow(SURE)
@@ -258,9 +259,13 @@ class Search:
                 path = path.first_branch()
             path.refine()
             other = None if path.reached else self.repeated(path)
+            paths += [path, *([other] if other else [])]
             certain, path = other is None, other or path
             if certain:
                 break
+        else:  # the lowest of their levels, on the safe side
+            path = min(paths, key=lambda path: path.highest)
+            grows = path.to_growth and (path.grows or path.ends)
         if path.reached:
             beyond = f"{path.target:g} m, twice the dam's height"
             return CriticalValue(
