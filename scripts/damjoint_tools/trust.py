@@ -88,8 +88,9 @@ time limit is a defect.
 
 Not checked here: stresses in the bodies and pictures; the default values themselves; that the
 branch which the load steps follow is the one that a dam would take, where there are several
-equilibria; geometries of one's own, but for two blocks whose joints meet; the reference GetDP model
-(the tests compare it with the engine of these runs)."""
+equilibria; geometries of one's own, but for two blocks whose joints meet; flow in time
+(`time_unit` > 0); the reference GetDP model (the tests compare it with the engine of these
+runs)."""
 
 #: What `damjoint stress --quake` verifies in every scene, and beside it.
 QUAKES_VERIFIED = """\
@@ -145,9 +146,10 @@ def trust_section(results: Path) -> tuple[str, str]:
 def dam_section(rows: list[Row]) -> str:
     """Return the section on dams under static loads."""
     parts = [
-        f"{len(rows)} random scenes of `damjoint stress`. Each is computed by `damjoint "
-        "run` and verified from its result files, by code that imports nothing "
-        "of the package. The scenes: dams from 5 to 150 m, $E$ from 1e9 to 1e13 Pa, $K_N$ from "
+        f"{len(rows)} random scenes of `damjoint stress` ({seeds_of(rows)}). "
+        "Each is computed by `damjoint run` and verified from its result files, by code that "
+        "imports nothing of the package. The scenes: dams from 5 to 150 m, "
+        "$E$ from 1e9 to 1e13 Pa, $K_N$ from "
         "1e8 to 1e15 Pa/m, all laws and uplifts, sections with batter, neck, sloping and "
         "lift joint, silt, ice, anchor, earthquake and temperature, rising and falling "
         "water; grouted and sawn joints, waterstops; four in ten have two to "
@@ -199,12 +201,11 @@ def mutation_section(rows: list[Row]) -> str:
 
 def quake_section(rows: list[Row]) -> str:
     """Return the section on earthquakes."""
-    seeds = sorted({row["scene"].partition("-")[0] for row in rows}, key=int)
-    named = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {', '.join(seeds)}"
     parts = [
         "## Earthquakes",
-        f"{len(rows)} random earthquakes of `damjoint stress --quake` ({named}), each computed by "
-        "`damjoint quake`. The scenes: dams from 8 to 120 m, $E$ from 5e9 to 1e11 Pa, $K_N$ from "
+        f"{len(rows)} random earthquakes of `damjoint stress --quake` ({seeds_of(rows)}), "
+        "each computed by `damjoint quake`. The scenes: dams from 8 to 120 m, "
+        "$E$ from 5e9 to 1e11 Pa, $K_N$ from "
         "1e9 to 1e13 Pa/m, all laws and uplifts, batter, sloping joint, one to three joints (most "
         "of the lift joints with a law and water of their own); added mass, water in the crack by "
         "each rule, damping of 1 to 10 % with and without its part by the mass, dashpots in the "
@@ -227,6 +228,12 @@ def quake_section(rows: list[Row]) -> str:
         slowest(rows),
     ]
     return "\n\n".join(parts)
+
+
+def seeds_of(rows: list[Row]) -> str:
+    """Return the seeds of scenes, in words."""
+    seeds = sorted({row["scene"].partition("-")[0] for row in rows}, key=int)
+    return f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {', '.join(seeds)}"
 
 
 SLOWEST = "Seconds of the complete command, while other scenes run in parallel."
