@@ -173,6 +173,8 @@ def results_page() -> str:
         "- `_sensitivity.csv`: Spearman's rank correlation of each sampled input with `failed` "
         "and, over the rows that stand, with `crack_length`, `max_opening` and `crest_ux`; of "
         "earthquakes, over the rows at rest, with `residual_slip` and `residual_tilt`.\n"
+        "- `_sobol.csv`, with `--design sobol`: `outcome`, `input`, Sobol's `first`-order and "
+        "`total` index, each with half the width of its 95 % interval.\n"
         "- `.png`: a chart of one or two varied parameters, or of the sample.",
         "## sensitivity.csv",
         "Written by `damjoint run --sensitivity` and `damjoint critical --sensitivity`, a row per "

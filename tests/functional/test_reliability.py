@@ -121,7 +121,9 @@ def test_three_joints_against_closed_form_samples():
     counts = [int(f.sum()) for f in (*fails, np.any(fails, axis=0))]
     for row, count in zip(result.rows, counts, strict=True):
         exact = stats.binomtest(count, 100_000).proportion_ci(0.95)
-        assert row.low < exact.high and row.high > exact.low, row.joint
+        # four intervals of 95 % miss once in five studies: within three standard errors
+        error = (row.high - row.low) / 2 / stats.norm.isf(0.025)
+        assert exact.low - 3 * error < row.sampled < exact.high + 3 * error, row.joint
         if row.joint:  # smooth
             assert exact.low * 0.9 < row.breitung < exact.high * 1.1, row.joint
     whole = result.rows[-1]
@@ -129,6 +131,24 @@ def test_three_joints_against_closed_form_samples():
     assert whole.form < 0.5 * counts[-1] / 100_000 and whole.breitung < whole.low
     assert "kink" in result.words[-1]
     assert result.design["lift 12 m.mu"] == pytest.approx(0.614902, rel=1e-6)
+
+
+def test_samples_around_the_design_point_are_unbiased():
+    """The mean of 40 studies with closed-form levels; the probability is that of 2e7 samples."""
+
+    class ClosedForm(reliability.CriticalLevels):
+        def of(self, joint, rows):
+            return [{"critical_level": slide_level(r["mu"], r["rho_dam"], 0)} for r in rows]
+
+    variables = reliability.Variables(VARIED)
+    levels = ClosedForm(dj.case("dam", levels=[30, 36], **SLIDES), variables)
+    limit, normal = reliability.LimitState(levels), variables.normal()
+    design = reliability.design_point(limit, normal, [0.0] * 3)
+    studies = [reliability.sampled(limit, normal, [design], 200, seed) for seed in range(40)]
+    shares = np.array([share for share, _, _ in studies])
+    mean_error = shares.std(ddof=1) / len(shares) ** 0.5
+    assert abs(shares.mean() - 4.459e-3) < 3 * mean_error < 0.1 * 4.459e-3
+    assert sum(low < 4.459e-3 < high for _, low, high in studies) >= 33  # of 40 of 95 %
 
 
 def rows(path):

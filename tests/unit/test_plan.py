@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from damjoint import InputError
 from damjoint.studies import sampling
-from damjoint.studies.plan import plan_of, sample_of
+from damjoint.studies.plan import Sample, plan_of, sample_of
 from scipy import stats
 
 MU = ["mu=0.6:1.0:0.2"]
@@ -135,3 +135,23 @@ def test_confidence_interval_of_a_probability():
 def test_a_constant_outcome_has_no_sensitivity():
     assert math.isnan(sampling.sensitivity(np.arange(4.0), np.ones(4)))
     assert sampling.sensitivity(np.arange(4.0), np.array([5, 4, 1, np.nan])) == -1
+
+
+def test_sobol_indices_of_a_function_with_an_interaction():
+    """Of Ishigami's function with a = 7, b = 0.1, in closed form."""
+    design = sampling.sobol_design(2048, 3, seed=1)
+    x, y, z = np.pi * (2 * design.T - 1)
+    first, total, first_width, total_width = sampling.sobol_indices(
+        np.sin(x) + 7 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x), 3
+    )
+    assert first == pytest.approx([0.3139, 0.4424, 0.0], abs=0.02)
+    assert total == pytest.approx([0.5576, 0.4424, 0.2437], abs=0.02)
+    assert (first_width > 0).all() and (total_width < 0.1).all()
+
+
+def test_the_design_of_sobol_indices_has_blocks_of_a_power_of_two():
+    sample = Sample(4, {"mu": "uniform(0.5,0.2)", "adhesion": "uniform(1e4,1e4)"}, "sobol")
+    assert len(sample.values()["mu"]) == sample.rows == 4 * 4
+    for number, given in ((3, ()), (4, ["mu,adhesion=0.5"])):
+        with pytest.raises(InputError):
+            Sample(number, sample.distributions, "sobol", correlate=given)

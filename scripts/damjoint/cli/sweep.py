@@ -48,9 +48,10 @@ def add(command: Parser) -> None:
     )
     command.add_argument(
         "--design",
-        choices=("latin", "monte-carlo"),
+        choices=("latin", "monte-carlo", "sobol"),
         default="latin",
-        help="Latin hypercube or independent random rows of --sample (default: latin)",
+        help="Latin hypercube or independent random rows of --sample, or the design of Sobol's "
+        "indices, of which N, a power of 2, has N (inputs + 2) rows (default: latin)",
     )
     command.add_integer(
         "--seed", 0, default=0, help="seed of the random numbers of --sample (default: 0)"

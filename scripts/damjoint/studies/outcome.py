@@ -21,13 +21,16 @@ STATIC = ("crack_length", "max_opening", "crest_ux")
 OF_QUAKES = ("residual_slip", "residual_tilt")
 
 
-def groups(plan: Plan, rows: list[Row]) -> list[tuple[Row, list[Row]]]:
-    """The combinations of varied values, and the rows of the sample with them."""
+def groups(plan: Plan, rows: list[Row], independent: bool = False) -> list[tuple[Row, list[Row]]]:
+    """The combinations of varied values, and the rows of the sample with them; independent: only
+    those that are, the first two blocks of a design for Sobol's indices.
+    """
+    most = 2 * plan.sobol if independent and plan.sobol else None
     columns = [column_of(name) for name in plan.varied]
     samples: dict[tuple[str, ...], list[Row]] = {}
     for row in rows:
         samples.setdefault(tuple(row[c] for c in columns), []).append(row)
-    return [(dict(zip(columns, k, strict=True)), sample) for k, sample in samples.items()]
+    return [(dict(zip(columns, k, strict=True)), rows[:most]) for k, rows in samples.items()]
 
 
 def probabilities(plan: Plan, rows: list[Row]) -> list[dict[str, Value]]:
@@ -35,7 +38,7 @@ def probabilities(plan: Plan, rows: list[Row]) -> list[dict[str, Value]]:
     rows; the probability of failure and the limits of its interval.
     """
     table: list[dict[str, Value]] = []
-    for values, sample in groups(plan, rows):
+    for values, sample in groups(plan, rows, independent=True):
         undecided = sum(row["verdict"] in UNDECIDED for row in sample)
         fails = sum(row["failed"] == "1" for row in sample) - undecided
         share, low, high = sampling.probability(fails, undecided, len(sample))
@@ -49,7 +52,7 @@ def sensitivities(plan: Plan, rows: list[Row]) -> list[dict[str, Value]]:
     with the outcomes and a critical value; nan where an outcome does not change.
     """
     table: list[dict[str, Value]] = []
-    for values, sample in groups(plan, rows):
+    for values, sample in groups(plan, rows, independent=True):
         stand = np.array([row["failed"] == "0" for row in sample])
         static = plan.slip_limit is None
         results = {o: numbers(sample, o) for o in (FAILED, *(STATIC if static else OF_QUAKES))}
@@ -63,13 +66,37 @@ def sensitivities(plan: Plan, rows: list[Row]) -> list[dict[str, Value]]:
     return table
 
 
+def indices(plan: Plan, rows: list[Row]) -> list[dict[str, Value]]:
+    """For each combination of the varied values and each sampled input: Sobol's indices of the
+    outcomes that all rows have; of the failure always.
+    """
+    table: list[dict[str, Value]] = []
+    number, static = len(plan.sampled), STATIC if plan.slip_limit is None else OF_QUAKES
+    for values, sample in groups(plan, rows):
+        for outcome in (FAILED, *static, *plan.critical_columns[:1]):
+            y = numbers(sample, outcome)
+            if not np.isfinite(y).all() or np.ptp(y) == 0:
+                continue
+            first, total, *widths = sampling.sobol_indices(y, number)
+            for k, name in enumerate(plan.sampled):
+                cells = {"first": first[k], "first_interval": widths[0][k]}
+                cells |= {"total": total[k], "total_interval": widths[1][k]}
+                numbers_of = {n: float(v) for n, v in cells.items()}
+                table.append({**values, "outcome": outcome, "input": name, **numbers_of})
+    return table
+
+
 def report(plan: Plan, rows: list[Row], out: Path) -> str:
     """Both tables as text; writes OUT_probability.csv and OUT_sensitivity.csv beside the rows."""
     texts = []
     interval = f"low, high: {sampling.CONFIDENCE:.0%} interval"
     titles = f"Probability of failure ({interval})", "Rank correlation with the outcome"
     tables = probabilities(plan, rows), sensitivities(plan, rows)
-    for ending, title, table in zip(STATISTICS, titles, tables, strict=True):
+    named = list(zip(STATISTICS, titles, tables, strict=False))
+    if plan.sobol and (shares := indices(plan, rows)):
+        title = f"Sobol's indices, with half of their {sampling.CONFIDENCE:.0%} intervals"
+        named.append((STATISTICS[-1], title, shares))
+    for ending, title, table in named:
         with atomic_write(beside(out, ending)) as path, path.open("w", newline="") as file:
             writer = csv.DictWriter(file, table[0], lineterminator="\n")
             writer.writeheader()

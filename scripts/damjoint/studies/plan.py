@@ -24,8 +24,9 @@ Row: TypeAlias = dict[str, str]
 #: Limit of the number of rows.
 MOST_ROWS = 1_000_000
 
-#: Designs of a sample: Latin hypercube, independent random rows.
-DESIGNS = ("latin", "monte-carlo")
+#: Designs of a sample: Latin hypercube, independent random rows, and that of Sobol's indices, with
+#: as many blocks of rows as there are inputs and two more.
+DESIGNS = ("latin", "monte-carlo", "sobol")
 
 #: Share of a step by which the last value of FIRST:LAST:STEP may lie beyond LAST.
 ROUNDING = 1e-9
@@ -37,8 +38,9 @@ DIGITS = 12
 class Sample:
     """A random sample: number of values, and distributions of scipy.stats by parameter, as texts.
 
-    Sample(100, {"mu": "normal(0.8,0.1)"}); design: latin (hypercube) or monte-carlo; correlate:
-    rank correlations, "A,B=R" each. Raises InputError.
+    Sample(100, {"mu": "normal(0.8,0.1)"}); design: latin (hypercube), monte-carlo or sobol (of
+    Sobol's indices, number * (inputs + 2) rows); correlate: rank correlations, "A,B=R" each.
+    Raises InputError.
 
     Example:
         >>> sample = Sample(3, {"mu": "normal(0.8,0.1)"})
@@ -57,6 +59,11 @@ class Sample:
             raise InputError(f"number = {self.number}: must be an integer from 1 to {MOST_ROWS}")
         if self.design not in DESIGNS:
             raise InputError(f"design = {self.design}: must be one of {', '.join(DESIGNS)}")
+        if self.design == "sobol":
+            if self.number < 2 or self.number & (self.number - 1):
+                raise InputError(f"number = {self.number}: must be a power of 2 with design sobol")
+            if self.correlate:
+                raise InputError("--correlate: must not be given with design sobol")
         if not isinstance(self.seed, int) or self.seed < 0:
             raise InputError(f"seed = {self.seed}: must be an integer >= 0")
         if not self.distributions:
@@ -72,6 +79,12 @@ class Sample:
             sampling.distribution(name, text)
         for text in self.correlate:
             sampling.correlation(text, [*self.distributions])
+
+    @property
+    def rows(self) -> int:
+        """The number of rows."""
+        blocks = len(self.distributions) + 2 if self.design == "sobol" else 1
+        return int(self.number) * blocks
 
     def values(self) -> dict[str, list[Value]]:
         """The values by name. Raises InputError."""
@@ -186,6 +199,8 @@ class Plan:
     tied: dict[str, str]
     #: quantity whose critical value is computed: level, strength, uplift, a parameter; empty: none
     critical: str = ""
+    #: number of rows of a block in the design of Sobol's indices; 0: another design
+    sobol: int = 0
     #: residual slip [m] beyond which a row fails, each row an earthquake; None: no earthquake
     slip_limit: float | None = None
 
@@ -223,7 +238,7 @@ def numbers(rows: list[Row], column: str) -> Array:
 
 
 #: Endings of the files that are made of all rows of a result file, see `beside`.
-CHART, STATISTICS = ".png", ("_probability.csv", "_sensitivity.csv")
+CHART, STATISTICS = ".png", ("_probability.csv", "_sensitivity.csv", "_sobol.csv")
 
 
 def beside(out: Path, ending: str) -> Path:
@@ -285,12 +300,13 @@ def plan_with(
             )
     if not axes and not sample:
         raise InputError("--vary, --sample: one must be given, such as --vary mu=0.3:0.8:0.05")
-    number = math.prod(len(values) for _, values in axes) * (sample.number if sample else 1)
+    number = math.prod(len(values) for _, values in axes) * (sample.rows if sample else 1)
     if number > MOST_ROWS:
         raise InputError(f"--vary, --sample: must give at most {MOST_ROWS} rows in all")
     if any(critical == name for _, name in names):
         raise InputError(f"--critical {critical}: must not be varied, sampled or tied as well")
-    return Plan(dict(axes), sample.values() if sample else {}, dict(ties), critical)
+    sobol = sample.number if sample and sample.design == "sobol" else 0
+    return Plan(dict(axes), sample.values() if sample else {}, dict(ties), critical, sobol)
 
 
 def cases_of(base: Case, plan: Plan) -> Iterator[tuple[dict[str, Value], Case]]:

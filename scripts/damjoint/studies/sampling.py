@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from scipy import linalg, stats
 
@@ -78,20 +80,46 @@ def draw(
 ) -> dict[str, Array]:
     """Draw `number` values of each name from distributions as texts.
 
-    correlations: 'A,B=R' each; design: latin (hypercube: McKay, Beckman, Conover 1979) or
-    monte-carlo. Raises InputError.
+    correlations: 'A,B=R' each; design: latin (hypercube: McKay, Beckman, Conover 1979),
+    monte-carlo or sobol, see `sobol_design`. Raises InputError.
     """
     frozen = [distribution(name, text) for name, text in distributions.items()]
     pairs = [correlation(text, list(distributions)) for text in correlations]
     generator = np.random.default_rng(seed)
     if design == "latin":
         shares = stats.qmc.LatinHypercube(len(frozen), seed=generator).random(number)
+    elif design == "sobol":
+        shares = sobol_design(number, len(frozen), seed)
     else:
         shares = generator.random((number, len(frozen)))
     if pairs:
         shares = correlated(shares, pairs)
     with np.errstate(all="ignore"):  # infinite values are refused later
         return {name: frozen[i].ppf(shares[:, i]) for i, name in enumerate(distributions)}
+
+
+def sobol_design(number: int, inputs: int, seed: int) -> Array:
+    """Uniform numbers (number (inputs + 2), inputs) for Sobol's indices [Saltelli et al. 2010]: two
+    samples A and B of a quasi-random sequence, and for each input A with that column of B.
+    """
+    both = stats.qmc.Sobol(2 * inputs, seed=seed).random(number)
+    first, second = both[:, :inputs], both[:, inputs:]
+    mixed = [np.where(np.arange(inputs) == column, second, first) for column in range(inputs)]
+    return np.concatenate([first, second, *mixed])
+
+
+def sobol_indices(outcome: Array, inputs: int) -> tuple[Array, Array, Array, Array]:
+    """Sobol's indices of first order and total ones (inputs,), and half of the width of their
+    intervals by bootstrap, of the outcomes of `sobol_design`.
+    """
+    first, second, *mixed = np.split(outcome[None, :], inputs + 2, axis=1)
+    blocks: dict[Literal["f_A", "f_B", "f_AB"], Array]
+    blocks = {"f_A": first, "f_B": second, "f_AB": np.array(mixed)}
+    result = stats.sobol_indices(func=blocks, n=first.shape[1])
+    again = result.bootstrap(confidence_level=CONFIDENCE)
+    intervals = again.first_order.confidence_interval, again.total_order.confidence_interval
+    widths = [np.ravel(interval.high - interval.low) / 2 for interval in intervals]
+    return np.ravel(result.first_order), np.ravel(result.total_order), widths[0], widths[1]
 
 
 def correlated(shares: Array, pairs: list[tuple[int, int, float]]) -> Array:
