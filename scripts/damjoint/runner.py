@@ -121,8 +121,8 @@ def write_fields_and_pictures(
             from .pictures.run_picture import draw
 
             draw(solution, folder)
-        if picture:
-            from .pictures import water_picture
+        if picture and any(joint["time_unit"] for joint in outcome.result.case.joints):
+            from .pictures import water_picture  # loads matplotlib
 
             if water_picture.has(outcome.result):
                 water_picture.draw(outcome.result, folder)
