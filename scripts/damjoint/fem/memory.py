@@ -27,9 +27,14 @@ FACTORISATION = 1.1e-11
 #: Iterations of a step, usually.
 ITERATIONS = 5.0
 
-#: Number of unknowns in 3D above which a run of few steps is faster with uncondensed bodies; that
-#: of many steps, over this power of their number; measured by `damjoint bench`.
-ITERATED, PER_STEP, STEPS_POWER = 50_000, 3500, 1.33
+# Uncondensed bodies in 3D are faster above a number of unknowns; measured by `damjoint bench`
+
+#: Number of unknowns of a run of few steps.
+ITERATED = 50_000
+#: Number of unknowns of a run of many steps, over the power STEPS_POWER of their number.
+PER_STEP = 3500
+#: See above [-].
+STEPS_POWER = 1.33
 #: Further memory of uncondensed bodies after their assembly [bytes per unknown], measured likewise.
 PER_UNKNOWN_ITERATED = 4000
 

@@ -209,7 +209,7 @@ class Law(Generic[V]):
 
     def shear_resistance(self, normal: float, length: float, damage: float, slip: float) -> float:
         """Shear force [N/m] that a joint of a length [m] transmits under an effective normal force
-        (compression > 0), at a mean damage and slip [m]: mu N + c L of what is left of c.
+        (compression > 0), at a mean damage and slip [m]: mu N + c L, c reduced by the damage.
         """
         cohesion = self.shear_strength(np.zeros(1), damage, slip)[0]
         return float(self.mu * normal + cohesion * length)

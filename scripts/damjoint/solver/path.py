@@ -40,72 +40,93 @@ from .state import State
 
 P = TypeVar("P", bound="EquilibriumPath")
 
-#: Relative precision of a critical value.
+#: Relative precision of a critical value [-].
 PRECISION = 1e-4
 
-#: First increment over the displacement so far.
+# The length of the increments
+
+#: First increment over the displacement so far [-].
 FIRST = 0.05
+#: Relative rise of the level that an increment aims at [-]; fewer equilibria above, more below.
+RISE = 0.02
+#: Bounds of an increment over the one before [-].
+SHRINKING, GROWTH = 0.25, 2.0
 
-#: An increment over the one before, at least and at most; the relative rise of the level that it
-#: aims at.
-SHRINKING, GROWTH, RISE = 0.25, 2.0, 0.02
+# An increment is halved until its two halves lead to the same state
 
-#: An increment is halved until its two halves lead to the same state: the level is the same to this
-#: part of it, and the jump to this part of its change over the increment.
-SAME_LEVEL, SAME_JUMP = 3e-5, 0.02
+#: Relative difference of the levels up to which they do [-]; larger ones pass to another branch.
+SAME_LEVEL = 3e-5
+#: Difference of the jumps up to which they do, over their change in the increment [-].
+SAME_JUMP = 0.02
 
-#: It is halved, too, until the level at its middle is the mean of those at its ends, to this part:
-#: no limit point is passed over. Only where the level is at least this part of the highest one, and
-#: while it is longer than this part of the displacement so far.
-STRAIGHT, NEAR_HIGHEST, SHORT = 3e-4, 0.95, 1e-3
+# An increment is halved until it passes over no limit point
 
-#: An increment is tried with one control, then with the next, before it is shortened further.
-#: The smallest one over the first, and over the displacement so far: where its halves lead
-#: elsewhere the branch ends.
-SHORTENED, SMALLEST, LEAST = 1 / 16, 1e-6, 1e-8
+#: Relative difference of the level at its middle from the mean of those at its ends [-].
+STRAIGHT = 3e-4
+#: This is looked at where the level is at least this part of the highest one [-].
+NEAR_HIGHEST = 0.95
+#: It is not looked at where an increment is shorter than this, over the displacement so far [-].
+SHORT = 1e-3
 
-#: A relative fall of the level by more than this is unstable crack growth under a level that is
-#: prescribed; less is that from one integration point to the next.
+# An increment that does not converge is tried with the next control, then shorter
+
+#: Factor by which it is shortened [-].
+SHORTENED = 1 / 16
+#: It is given up when it is shorter than this, over the first trial [-]: the branch ends there.
+SMALLEST = 1e-6
+#: The same over the displacement so far [-].
+LEAST = 1e-8
+
+# Unstable growth of the crack
+
+#: Relative fall of the level above which growth is unstable under a prescribed level [-]; smaller
+#: falls are those from one integration point to the next.
 FALL = 1e-3
-
-#: It is halved, too, as long as points whose damage grows by more than this in a half lose tensile
-#: strength of more than the part FALL of the water's thrust: where they soften in a single
-#: increment the level may fall within it.
+#: An increment is halved, too, as long as points whose damage grows by more than this in a half [-]
+#: lose tensile strength of more than the part FALL of the water's thrust: where they soften in a
+#: single increment the level may fall within it.
 LARGEST_GROWTH = 0.35
-
-#: A fall of the level over which damage and slip grow by less than this part of what they did
-#: before, over the movement, is unloading.
+#: Growth of damage and slip over the movement, over what it was before, below which a fall of the
+#: level is elastic unloading along the path [-].
 UNLOADING = 0.05
 
-#: After so many increments, one after the other, that are shorter than this part of the
-#: displacement so far, a branch counts as lost.
-MOST_SHORT, CRAWL = 40, 1e-5
+# A branch counts as lost after many short increments
 
-#: Where a branch ends, or falls: the relative rise of the level that an increment aims at; an
-#: increment of the process zone over what it moved in the last step; the parts of its length at
-#: which an increment is tried; then those of the crest, over the displacement so far.
-SMALL_RISE, ZONE_GROWTH, PARTS = 0.005, 1.5, (1, 1 / 4, 1 / 16)
+#: An increment is short below this part of the displacement so far [-].
+CRAWL = 1e-5
+#: Number of short ones, one after the other.
+MOST_SHORT = 40
+
+# Increments where a branch ends, or falls
+
+#: Relative rise of the level that they aim at [-].
+SMALL_RISE = 0.005
+#: Increment of the mean jump of the process zone over its change in the last step [-].
+ZONE_GROWTH = 1.5
+#: Parts of its length at which an increment is tried [-].
+PARTS = (1, 1 / 4, 1 / 16)
+#: Increments of the crest that are tried last, over the displacement so far [-].
 JUMPS = (0.01, 0.05, 0.25)
 
-#: How many times the displacement grows before a level counts as not rising any more: for a first
-#: estimate, and for the result.
-ROUGH, SURE = 1.5, 4.0
+# The highest level
 
-#: Levels that differ relatively by less are the same.
+#: Growth of the displacement after which a level counts as not rising any more [-]: for a first
+#: estimate.
+ROUGH = 1.5
+#: The same for the result.
+SURE = 4.0
+#: Relative difference up to which levels are the same [-].
 PLATEAU = 1e-7
-
-#: A joint takes part in a mechanism if its jumps change by more than this part of the largest
-#: change.
+#: A joint takes part in a mechanism if its jumps change by more than this, over the largest change.
 MOVES = 0.5
-
-#: Increments at most that are inserted where a branch may be higher than its points.
+#: Most increments that are inserted where a branch may be higher than its points.
 MOST_REFINED = 40
+#: The path is repeated from this relative distance below the highest level [-].
+REPEATED = 0.01
+#: By how many times shorter increments it is repeated.
+SHORTER = 4
 
-#: The path to the highest level from this part of it below is repeated by increments that are so
-#: many times shorter.
-REPEATED, SHORTER = 0.01, 4
-
-#: Equilibria at most on a path.
+#: Most equilibria on a path.
 MOST_POINTS = 800
 
 
@@ -315,7 +336,7 @@ class Point:
 
     def unloads(self, begin: Point) -> bool:
         """Whether the level falls in the last step while damage and slip grow by a small part of
-        what they did before another point: the way back, not the continuation of a path.
+        what they did up to another point: elastic unloading along the path already passed.
         """
         return self.level < begin.level and self.dissipation <= UNLOADING * begin.dissipation
 
@@ -376,7 +397,9 @@ class EquilibriumPath:
 
     @property
     def ends_at_strength(self) -> bool:
-        """Whether all strength of a joint is used at its highest level, and no way on is left."""
+        """Whether all strength of a joint is used at its highest level, and no increment from there
+        converges.
+        """
         return self.stops and self.points[self.top].slipping is not None
 
     @property

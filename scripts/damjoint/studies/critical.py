@@ -73,9 +73,10 @@ NEAR_BOUND = 0.02
 #: The smallest value of a parameter that has to be positive.
 TINY = 1e-30
 
-#: Relative distance from the gravity method's critical value at which the search begins, and the
-#: precision of that value.
-BESIDE_GRAVITY, GUESS_PRECISION = 0.01, 1e-3
+#: Relative distance from the gravity method's critical value at which the search begins [-].
+BESIDE_GRAVITY = 0.01
+#: Relative precision of that value [-].
+GUESS_PRECISION = 1e-3
 
 #: How often a step of the search is doubled at most.
 MOST_DOUBLED = 20
@@ -334,7 +335,7 @@ class Search:
 
     def after_growth(self, path: FailurePath) -> tuple[dict[str, float], FailurePath]:
         """The highest levels [m] that are reached after the unstable crack growth that ends a path,
-        by how it is passed over; and the path, followed farther if there are none.
+        by how it is passed over; and the path, continued if there is no growth.
         """
         after, ended, farther = dict[str, float](), path.ended, path
         for name, relaxes in AFTER.items():
@@ -382,9 +383,9 @@ class Search:
             stands, fails = ends
 
     def beyond(self, stands: Trial, step: float) -> tuple[Trial, Trial] | None:
-        """The last stand and the first failure beyond a trial that stands: of the trials that
-        failed by their first estimate, now followed further; else at distances doubled from a step
-        on. None if all values that the case allows stand.
+        """A bracket beyond a value that stands: the last value with and the first without
+        equilibrium. Tried are first the values that failed by their first estimate, whose paths are
+        continued, then distances doubled from a step on. None if all allowed values stand.
         """
 
         def ahead(trial: Trial) -> float:
@@ -477,7 +478,7 @@ class Search:
             if inside:
                 value = inside[0]
             else:
-                # the more values stand beside the same root, the farther beyond it
+                # widen the offset fourfold per consecutive success
                 share = 0.4 * PRECISION * 4.0 ** max(stood - 1, 0)
                 secant = self.extrapolate(stands, fails, share) if turn % 4 else None
                 value, turn = middle(*ends) if secant is None else secant, turn + 1

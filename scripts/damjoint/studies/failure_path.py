@@ -37,9 +37,10 @@ CRITICAL = {
     "compression": ("Pa", "total compression at the toe"),
 }
 
-#: The part of a joint that may open or soften before a displacement is prescribed. How often a step
-#: of the level is halved at most, until its two halves lead to the same state.
-SOFTENED, HALVINGS = 0.1, 4
+#: Part of a joint that may open or soften before a displacement is prescribed [-].
+SOFTENED = 0.1
+#: How often a step of the level is halved at most, until its two halves lead to the same state.
+HALVINGS = 4
 
 #: The part of the uplift by which it falls under a rising level where the water withdraws.
 WITHDRAWN = 0.005
