@@ -35,6 +35,10 @@ def test_the_hint_stands_where_an_opened_zone_has_less_than_three_elements(
     assert result.last["max_opening"] > 3e5 / 1e11
     wanted = f"n_joint = {process_zone.least(result.case)} or --accuracy resolves it"
     assert any(wanted in hint for hint in hints(result)) == expected
+    glass = {"n_joint": n_joint, "G_f": 0.05, "K_N": 1e13}
+    (finer,) = solve("dam", "45", **BRITTLE | COARSE | glass)
+    needed = f"whatever n_joint: {process_zone.least(finer.case)} elements would be needed"
+    assert any(needed in hint for hint in hints(finer))
     (closed,) = solve("dam", "5", **BRITTLE | COARSE)
     assert not any("process zone" in hint for hint in hints(closed))
 

@@ -140,10 +140,14 @@ def hints_on_state(results: Results, last: dict[str, float]) -> list[str]:
             "--accuracy 3% chooses the mesh and estimates the error"
         )
     if process_zone.elements(results) < process_zone.LEAST:
+        least = process_zone.least(case)
+        advice = f"; n_joint = {least} or --accuracy resolves it"
+        if least > process_zone.MOST:
+            advice = f", whatever n_joint: {least} elements would be needed"
         messages.append(
             f"the fracture process zone is {process_zone.length(case):.2g} m long (9 pi/32 E' "
             f"G_f/f_t^2), less than {process_zone.LEAST} elements of {element:.2g} m: the crack "
-            f"depends on the mesh; n_joint = {process_zone.least(case)} or --accuracy resolves it"
+            f"depends on the mesh{advice}"
         )
     if has_drains(case) and len(results.joint["time"]):  # a section's mesh has a node there
         away = np.abs(results.at()["s"] - case["drain_x"]).min()

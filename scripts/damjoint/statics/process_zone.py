@@ -17,6 +17,8 @@ from ..model.results import Results
 RICE = 9 * math.pi / 32
 #: Least number of elements in it.
 LEAST = 3
+#: Most elements of a joint in 2D; where the zone needs more, no mesh resolves it.
+MOST = 2000
 
 
 def length(case: Case) -> float:
