@@ -97,6 +97,7 @@ DIMENSIONS = {
     "m": (1, 0, 0),
     "Pa": (0, 1, 0),
     "Pa per m": (-1, 1, 0),
+    "m per Pa": (1, -1, 0),
     **dict.fromkeys(["N per m", "N/m"], (1, 1, 0)),
     "N m/m": (2, 1, 0),
     "m per s2": (0, 0, 1),
