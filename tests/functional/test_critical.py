@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -561,6 +562,27 @@ def test_the_branch_of_a_joint_that_releases_its_shear_ends_in_unstable_growth()
     _, answer = search_result("dam", settings=settings, levels="5.88,18.9")
     assert (answer.confirmed, answer.mode) == (True, "unstable crack growth")
     assert answer.after["by relaxation"] > answer.value > 20
+
+
+@pytest.mark.heavy
+def test_growth_that_one_path_sees_and_another_does_not_is_not_confirmed():
+    """The level falls by 1.3e-3 from one point to the next, with shorter increments by less than
+    the 1e-3 of unstable growth. The interval of either path has the level of the other.
+    """
+    dam = {"dam_height": 110.4, "dam_base": 97.49, "dam_crest": 11.8, "n_joint": 20.0}
+    joint = {"law": "rupture", "K_N": 5.196e10, "K_T": 4.116e10, "uplift": "flow"}
+    joint |= {"sigma_max": 29250.0, "alpha": 2.0, "pena_rupture": 1.064}
+    bodies = {"E": 1.886e10, "E_found": 2.206e10, "nu": 0.2307}
+    one, other = (
+        search_result("dam", settings=dam | joint | bodies, levels="110.4", rise=rise)[1]
+        for rise in (1.0, 0.3)
+    )
+    assert max(one.value, other.value) > 1.01 * min(one.value, other.value)
+    for answer in (one, other):
+        low, high = (float(number) for number in re.findall(r"\d+\.?\d*", answer.doubt)[:2])
+        assert not answer.confirmed
+        assert low < 1.0001 * min(one.value, other.value)
+        assert high > 0.9999 * max(one.value, other.value)
 
 
 def test_the_level_may_rise_in_the_last_interval_as_steeply_as_before_it():

@@ -378,6 +378,8 @@ class EquilibriumPath:
         self.over = FIRST * self.size
         #: relative rise of the level that an increment aims at
         self.rise = RISE
+        #: relative fall of the level that is unstable growth
+        self.unstable_fall = FALL
         #: the next increment, over what the joints moved in the last one
         self.growth = 1.0
         #: the lowest and the highest of the highest levels [m] of the paths that have led to this
@@ -390,10 +392,10 @@ class EquilibriumPath:
 
     @property
     def falls(self) -> bool:
-        """Whether the level falls by more than FALL beyond its highest one, on the first branch."""
+        """Whether the level falls unstably beyond its highest one, on the first branch."""
         first = self.starts[0] if self.starts else len(self.points)
         levels = self.levels[self.top : first]
-        return bool(len(levels) and levels.min() < (1 - FALL) * self.highest)
+        return bool(len(levels) and levels.min() < (1 - self.unstable_fall) * self.highest)
 
     @property
     def ends_at_strength(self) -> bool:
@@ -529,7 +531,7 @@ class EquilibriumPath:
         or where increments stay short, none are sought; where a joint slips whole, no short ones.
         """
         last, part = self.points[-1], 1.0
-        if last.level < (1 - FALL) * self.highest or self.crawled > MOST_SHORT:
+        if last.level < (1 - self.unstable_fall) * self.highest or self.crawled > MOST_SHORT:
             return False
         while part > (SHORTENED if last.slipping is not None else SMALLEST):
             for kind, control in last.controls.items():
@@ -738,11 +740,11 @@ class EquilibriumPath:
 
     def growth_until(self, number: int) -> float | None:
         """The level [m] of the first limit point among so many points, after which the level falls
-        by more than FALL; None if there is none.
+        unstably; None if there is none.
         """
         levels = self.levels[:number]
         highest = np.maximum.accumulate(levels)
-        falls = np.flatnonzero(levels < (1 - FALL) * highest)
+        falls = np.flatnonzero(levels < (1 - self.unstable_fall) * highest)
         return float(highest[falls[0]]) if len(falls) else None
 
     def insert(self, left: int, new: list[Point]) -> None:

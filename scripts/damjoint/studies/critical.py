@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import chain, zip_longest
+from typing import Any
 
 import numpy as np
 from scipy.optimize import bisect
@@ -63,6 +64,11 @@ MOST_REPEATED = 3
 #: Relative length of the increments of the path that is compared with one on which a branch has
 #: ended.
 SHORTER_RISE = 0.5
+#: First level of the path that begins lower, over that of the case [-].
+LOWER_BEGIN = 0.6
+#: Factor by which the fall that is unstable growth is changed, down and up [-]: it varies by a
+#: quarter with the increments.
+FALL_FACTOR = 1.35
 
 #: How unstable crack growth is passed over: whether by relaxation.
 AFTER = {"by displacement": False, "by relaxation": True}
@@ -276,8 +282,9 @@ class Search:
         after, ends = dict[str, float](), grows and path.ended
         if point and grows:
             first, (after, path) = path, self.after_growth(path)
-            if certain and after and first.releases_shear:  # that of a point may be passed over
-                other = self.from_beginning(first)
+            # the growth of a single point may be passed over
+            if certain and (after or first.releases_shear):
+                other = self.otherwise(first)
                 certain = other is None
         result = self.result(point.level if point else None, path, point)
         if point is None:
@@ -314,17 +321,43 @@ class Search:
             self.trials[-1] = replace(self.trials[-1], path=other)
         return other
 
-    def from_beginning(self, path: FailurePath) -> FailurePath | None:
+    def otherwise(self, path: FailurePath) -> FailurePath | None:
+        """The first path that leads to another highest level, of those by shorter increments, with
+        another fall of the level as unstable growth, and of one that begins at a lower level; None
+        if all lead to the same.
+        """
+        first, *further = path.case.levels
+        levels = (LOWER_BEGIN * first, *(further or [first]))
+        tails = path.case.tail_levels if further else 2 * path.case.tail_levels
+        lower = varied(path.case, {}, levels, tails)
+        falls = FALL / FALL_FACTOR, FALL * FALL_FACTOR
+        ways: list[dict[str, Any]] = [{"share": SHORTER_RISE}]
+        ways += [{"share": 1.0, "unstable_fall": fall} for fall in falls]
+        ways += [{"share": 1.0, "case": lower}]
+        paths = (self.from_beginning(path, **way) for way in ways)
+        return next((other for other in paths if other), None)
+
+    def from_beginning(
+        self,
+        path: FailurePath,
+        share: float = SHORTER_RISE,
+        unstable_fall: float = FALL,
+        case: Case | None = None,
+    ) -> FailurePath | None:
         """The path by shorter increments from its beginning on, to the first unstable growth if it
         is; None if they lead to the same highest level.
+
+        share: of the level's rise that an increment aims at; unstable_fall: relative fall of the
+        level that is unstable growth; case: with other levels.
         """
-        rise, to_growth = SHORTER_RISE * path.rise, path.to_growth
+        rise, to_growth = share * path.rise, path.to_growth
         other = FailurePath(
-            *(path.case, path.interface, path.target),
+            *(case or path.case, path.interface, path.target),
             to_growth=to_growth,
             rise=rise,
             solver=path.solver,
         )
+        other.unstable_fall = unstable_fall
         other.follow(SURE)
         if to_growth and other.starts:
             other = other.first_branch()

@@ -20,7 +20,7 @@ from ..model.results import HISTORY, Columns, column_of, with_all_joints
 from ..solver.controls import LevelControl
 from ..solver.history import joint_row
 from ..solver.load_stepper import SAME_TIME, LoadStepper
-from ..solver.path import FALL, RISE, EquilibriumPath, Point
+from ..solver.path import RISE, EquilibriumPath, Point
 
 #: Columns of critical.csv: a row per equilibrium of each dam that was tried. With several joints:
 #: of the first one; see `critical_columns`.
@@ -266,7 +266,7 @@ class FailurePath(EquilibriumPath):
             if self.water_withdraws and not self.to_growth:
                 self.fill_on()
             if self.to_growth and self.top + 1 < len(self.points):
-                self.refine(self.points[-1].level / (1 - FALL))  # how far it falls
+                self.refine(self.points[-1].level / (1 - self.unstable_fall))  # how far it falls
         if not self.reached:
             self.refine(self.target)
 
