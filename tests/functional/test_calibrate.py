@@ -159,7 +159,7 @@ def test_files_repeat_the_calibrated_run(tmp_path, command):
     assert command("report", str(out), "--to", "report.html")[0] == 0
     page = (tmp_path / "report.html").read_text()
     assert "<h3>Calibration</h3>" in page and info["calibration"]["verdict"] in page
-    again = dj.run(dj.case(out / "dam_calibrated.case"))
+    again = dj.run(dj.case(out / "calibrated.case"))
     crest = [float(r["computed"]) for r in rows if r["series"] == "crest_ux"]
     assert_allclose(again.history.crest_ux[-6:], crest, rtol=1e-6)
     assert (out / "dam_calibration.png").stat().st_size > 1e4

@@ -30,8 +30,12 @@ TABLES = (
     *("joint.csv", "history.csv", "curve.csv", "steps.csv", "gravity.csv", "critical.csv"),
     *("quake.csv", "quake_joint.csv", "quake_stress.npz", "quake_state.npz"),
     *("modes.csv", "reliability.csv", "design_point.case", "sensitivity.csv", "run.json"),
+    *("calibration.csv", "residuals.csv", "calibrated.case"),
 )
-PICTURES = ("", "_curve", "_check", "_critical", "_quake", "_modes", "_water", "_sensitivity")
+PICTURES = (
+    *("", "_curve", "_check", "_critical", "_quake", "_modes", "_water", "_sensitivity"),
+    "_calibration",
+)
 FIELDS = r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd"
 #: States of a run that has come to its end: the last one; of the loads or of the equilibria.
 COMPLETE, STOPPED = "complete", "stopped"

@@ -72,7 +72,7 @@ def save(study: Session, answer: Calibration, picture: bool) -> None:
     entries = {"calibration": as_json(answer), "wall_seconds": {"search": study.seconds}}
     result.info |= about(stepper.model.equilibrium.bulk) | entries
     study.save(result, more=partial(write_tables, answer))
-    file = study.out / f"{name}_calibrated.case"
+    file = study.out / "calibrated.case"
     with atomic_write(file) as part:
         part.write_text(case_text(answer.case))
     if picture:

@@ -540,8 +540,8 @@ class Search:
         """The result of a search that an error or an interrupt has ended: its last trials."""
         standing = [t for t in self.trials if t.stands]
         ends = [f"{t.value:.6g} {result_of(t)}" for t in self.trials[-2:]]
-        state, _ = end_of(error)
-        doubt = f"{state}: {', '.join(ends)}" if ends else state
+        reason = str(error) or end_of(error)[0]
+        doubt = f"{reason}: {', '.join(ends)}" if ends else reason
         point = point_at_target(standing[-1]) if standing else None
         return CriticalValue(None, "", "", doubt, point, error=error)
 

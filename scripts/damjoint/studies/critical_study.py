@@ -155,6 +155,8 @@ def save(study: Session, search: Search, answer: CriticalValue) -> None:
             study.add(result, lambda out: write_fields(solution, out / "fields"))
     else:
         study.save_without_results(state or folders.COMPLETE, answer.doubt, entries)
+    if not search.trials:
+        return
     write_csv(study.out / "critical.csv", table(search))
     picture.draw(content(search, answer), study.out / f"{search.case.name}_critical.png")
 

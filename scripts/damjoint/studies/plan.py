@@ -199,10 +199,10 @@ class Plan:
     tied: dict[str, str]
     #: quantity whose critical value is computed: level, strength, uplift, a parameter; empty: none
     critical: str = ""
-    #: number of rows of a block in the design of Sobol's indices; 0: another design
-    sobol: int = 0
     #: residual slip [m] beyond which a row fails, each row an earthquake; None: no earthquake
     slip_limit: float | None = None
+    #: number of rows of a block in the design of Sobol's indices; 0: another design
+    sobol: int = 0
 
     @property
     def critical_columns(self) -> list[str]:
@@ -306,7 +306,7 @@ def plan_with(
     if any(critical == name for _, name in names):
         raise InputError(f"--critical {critical}: must not be varied, sampled or tied as well")
     sobol = sample.number if sample and sample.design == "sobol" else 0
-    return Plan(dict(axes), sample.values() if sample else {}, dict(ties), critical, sobol)
+    return Plan(dict(axes), sample.values() if sample else {}, dict(ties), critical, sobol=sobol)
 
 
 def cases_of(base: Case, plan: Plan) -> Iterator[tuple[dict[str, Value], Case]]:
