@@ -7,7 +7,7 @@ from dataclasses import replace
 import damjoint as dj
 import numpy as np
 import pytest
-from damjoint.studies.calibrate import CONFIDENCE, free_of
+from damjoint.studies.calibrate import CONFIDENCE, free_of, inverse
 from damjoint.studies.measurements import Measurements, Series, read
 from numpy.testing import assert_allclose
 
@@ -177,6 +177,12 @@ def test_what_the_measurements_do_not_determine_is_named(tmp_path, command):
     answer = dj.calibrate(dam, file, ["G_f=lognorm(0.3,0,90)"], jobs=1)
     assert_allclose(answer.estimates, [90], rtol=1e-4)
     assert_allclose(answer.deviations, [0.3], rtol=1e-3)
+
+
+def test_fewer_values_than_parameters_determine_none_of_them():
+    """One value of two parameters that both act; two values, one of each, determine both."""
+    assert np.isinf(np.diag(inverse(np.array([[2.0, 1.0]])))).all()
+    assert_allclose(np.diag(inverse(np.array([[2.0, 0.0], [0.0, 4.0]]))), [0.25, 0.0625])
 
 
 def test_a_start_without_equilibrium_names_the_reading(tmp_path, command):

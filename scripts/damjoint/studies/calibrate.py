@@ -427,11 +427,12 @@ def inverse(slopes: Array) -> Array:
     """Covariance of the estimates, the inverse of slopes' slopes; inf for parameters that take part
     in a direction without effect.
     """
-    _, singular, directions = np.linalg.svd(slopes, full_matrices=False)
+    number = slopes.shape[1]  # rows of zeros: all directions, also of fewer values than parameters
+    padded = np.vstack([slopes, np.zeros((number, number))])
+    _, singular, directions = np.linalg.svd(padded, full_matrices=False)
     effect = singular > NO_EFFECT * max(singular.max(initial=0.0), 1.0)
     scaled = directions[effect].T / singular[effect]
     covariance: Array = scaled @ scaled.T
     silent = (np.abs(directions[~effect]) > np.sqrt(NO_EFFECT)).any(axis=0)
-    silent |= np.zeros(slopes.shape[1], dtype=bool)
     covariance[np.diag_indices_from(covariance)] = np.where(silent, np.inf, np.diag(covariance))
     return covariance

@@ -46,13 +46,9 @@ class Series:
     def computed(self, results: Results, times: Array) -> Array:
         """The same quantity in a run, at times; nan where the run has none."""
         if self.position is None:
-            found = np.full(len(times), np.nan)
-            at = {float(t): k for k, t in enumerate(np.round(results.history["time"], 9))}
-            column = results.history[self.name]
-            for k, time in enumerate(times):
-                if time in at:
-                    found[k] = column[at[time]]
-            return found
+            at = np.round(results.history["time"], 9)
+            values = dict(zip(at.tolist(), results.history[self.name], strict=True))
+            return np.array([values.get(time, np.nan) for time in times.tolist()])
         case = results.case.joints[self.joint]
         table = results.of_joint(self.joint).joint
         weight = case["rho_water"] * case["g"]
