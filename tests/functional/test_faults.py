@@ -19,7 +19,7 @@ from damjoint import RunError
 from damjoint.csr import CsrMatrix
 from damjoint.engines import engine_of
 from damjoint.fem import factor, memory
-from damjoint.processes import pool_of
+from damjoint.processes import ProcessKilled, pool_of
 from damjoint.storage import atomic_write, locked_folder
 from PIL import Image
 from processes import without_progress
@@ -75,10 +75,26 @@ def test_an_interrupt_that_leaves_no_result_does_not_say_so(command, monkeypatch
     assert (code, err) == (130, "damjoint: interrupted\n")
 
 
+def test_an_interrupt_that_waits_for_an_import_is_no_failure(command, monkeypatch):
+    """Its signal has also ended a process of a pool."""
+
+    def killed(*_, **__):
+        signal.signal(signal.SIGALRM, signal.SIG_IGN)
+        signal.setitimer(signal.ITIMER_REAL, 60)
+        raise ProcessKilled
+
+    monkeypatch.setattr("damjoint.solver.model.Model.start", killed)
+    try:
+        code, _, err = command(*RUN)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+    assert (code, err) == (130, "damjoint: interrupted\n")
+
+
 def test_worker_processes_end_with_their_parent(tmp_path):
     script = """
 import os, time
-from damjoint.processes import pool_of
+from damjoint.processes import ProcessKilled, pool_of
 with pool_of(2) as pool:
     print(*{pool.submit(os.getppid).result(), *pool._processes}, flush=True)
     time.sleep(600)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import io
 import os
+import signal
 import sys
 from importlib import import_module
 from types import ModuleType
@@ -87,6 +88,11 @@ def one_line(error: BaseException) -> str:
     return "damjoint: " + "".join(map(escape, str(error)))
 
 
+def interrupted() -> str:
+    """Return the message of an interrupted command."""
+    return "damjoint: interrupted" + ("; results finished so far are saved" if SAVED else "")
+
+
 def with_negative_lists(words: list[str]) -> list[str]:
     """Return the words with `--levels -1,3` as `--levels=-1,3`: argparse takes a word that begins
     with a minus sign for an option.
@@ -118,8 +124,9 @@ def main(argv: list[str] | None = None) -> int:
     # OSError: full disk, no permission; ImportError: a library that has been removed
     except (RunError, OSError, ImportError) as error:
         message, code = one_line(error), 1
+        if signal.getitimer(signal.ITIMER_REAL)[0]:  # an interrupt waits for an import, see
+            message, code = interrupted(), 130  # __main__.py; its signal has ended other processes
     except KeyboardInterrupt:
-        kept = "; results finished so far are saved" if SAVED else ""
-        message, code = f"damjoint: interrupted{kept}", 130
+        message, code = interrupted(), 130
     print(message, file=sys.stderr)
     return code
