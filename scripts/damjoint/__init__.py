@@ -31,7 +31,7 @@ session.py  the life of a study in its output folder
 runner.py   solves a case and writes its results
 studies/    checks, sweeps, critical values, reliability, a law along a path, reports
 verification/  published tests, for `damjoint validate`
-library.py  the interface for Python: case, run, check, quake, modes, ...; its words:
+library/    the interface for Python: case, run, check, quake, modes, ...; its words:
             python_words.py
 gui/        the Gmsh window
 cli/        the command line, a file for each command; __main__.py prepares its process
@@ -106,7 +106,7 @@ def data(folder: str) -> Path:
     return packaged if packaged.is_dir() else Path(__file__).resolve().parents[2] / folder
 
 
-#: What `import damjoint` offers, see library.py; imported when it is used.
+#: What `import damjoint` offers, see library/; imported when it is used.
 LIBRARY = (
     *("case", "run", "fill", "check", "critical", "quake", "modes", "sweep"),
     *("reliability", "calibrate"),

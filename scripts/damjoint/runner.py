@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,6 +36,19 @@ class RunProgress(Progress):
             self.describe(self.name)
         self.update(now - self.reached[scene])
         self.reached[scene] = now
+
+
+def compute(case: Case, engine: str = "auto", fields: bool = True) -> Outcome:
+    """The outcome of a case with its first uplift alone; nothing is written.
+
+    engine: see `engine_of`; fields: whether those of the bodies are needed. Raises InputError,
+    RunError.
+    """
+    single = replace(case, also_uplift=())
+    outcome = next(accuracy.solve(single, engine_of(single, engine), lambda *_: None, fields))
+    if outcome.error:
+        raise outcome.error
+    return outcome
 
 
 def run(

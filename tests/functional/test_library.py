@@ -438,7 +438,7 @@ def test_the_examples_of_the_docstrings(name, tmp_path, monkeypatch):
     """Of all functions and classes; that of Case is in `case`."""
     monkeypatch.chdir(tmp_path)
     example = doctest.DocTestParser().get_doctest(
-        getattr(dj, name).__doc__, {**vars(library), "np": np}, name, None, None
+        getattr(dj, name).__doc__, {**vars(library), "np": np, "Path": Path}, name, None, None
     )
     result = doctest.DocTestRunner().run(example)
     assert result.attempted and not result.failed

@@ -182,7 +182,7 @@ def test_a_killed_process_is_an_error_that_counts_the_saved_rows(command, tmp_pa
     without_rows = r"^a process was killed \(out of memory\?\); --jobs 1"
     with pytest.raises(ProcessKilled, match=without_rows), pool_of(1) as pool:
         pool.submit(os._exit, 9).result()
-    monkeypatch.setattr(sweep, "compute", killed)
+    monkeypatch.setattr(sweep, "spread", killed)
     code, _, err = command(*WORDS, "--vary", "mu=0.5,0.6")
     assert code == 1 and "1 rows are saved, the same command continues" in err
     assert len(rows(tmp_path / "mu.csv")) == 1

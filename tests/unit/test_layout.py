@@ -36,7 +36,7 @@ def part_of(path):
 
 def imported(path):
     """The modules of the package that a file imports, as paths below it. The package itself imports
-    none of them, see test_library.py: it names those of library.py for type checkers.
+    none of them, see test_library.py: it names those of library for type checkers.
     """
     if path == PACKAGE / "__init__.py":
         return

@@ -7,16 +7,15 @@ over decades, for which a derivative does not stand.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from .. import InputError, RunError, accuracy
-from ..engines import engine_of
+from .. import InputError, RunError
 from ..input.case import Case
 from ..input.resolve import varied
 from ..model.results import Results
 from ..post.summary import Table, aligned, table_of
+from ..runner import compute
 from ..statics import gravity
 from ..statics.verdict import verdict
 from ..units import LENGTHS, with_unit
@@ -62,21 +61,9 @@ def repetitions(
             values = tuple(factor * joint[name] for joint in case.joints)
             try:
                 changed = varied(case, {name: values if len(values) > 1 else values[0]})
-                yield f"{name}{label}", solved(changed, engine)
+                yield f"{name}{label}", compute(changed, engine, fields=False).result
             except (InputError, RunError) as error:
                 yield f"{name}{label}", str(error)
-
-
-def solved(case: Case, engine: str) -> Results:
-    """The results of a case with one uplift.
-
-    Raises InputError, RunError.
-    """
-    single = replace(case, also_uplift=())
-    outcome = next(accuracy.solve(single, engine_of(single, engine), lambda _, __: None, False))
-    if outcome.error:
-        raise outcome.error
-    return outcome.result
 
 
 #: Columns of the table: name in `state_of`, heading, units.

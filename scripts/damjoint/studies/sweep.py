@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from .. import InputError, RunError, accuracy
+from .. import InputError, RunError, accuracy, runner
 from ..arrays import Value, Values
-from ..engines import engine_of
 from ..input import parameters
 from ..input.case import Case
 from ..input.refinement import first_mesh
@@ -190,16 +189,6 @@ def planned(case: Case, plan: Plan) -> Iterator[tuple[str, Values, Task]]:
         yield key_of(varied, plan), row, task
 
 
-def notes_on_rows(case: Case, rows: Sequence[Case]) -> list[str]:
-    """The notes on rows that their case does not have, the first one on each parameter."""
-    of_case, lines = notes_on_settings(case), dict[str, str]()
-    for row in rows:
-        for note in notes_on_settings(row):
-            if note not in of_case:
-                lines.setdefault(note.split()[0], note)
-    return list(lines.values())
-
-
 def source_of(case: Case) -> Source:
     """Where a case comes from. Raises InputError if it was read from the files of a run."""
     if case.source is None:
@@ -282,21 +271,49 @@ def spread_bundles(
             yield from zip(work[number], rows, strict=True)
 
 
-def compute(
-    tasks: dict[str, Task], jobs: int | None, scheduler: str | None = None
-) -> Iterator[tuple[str, dict[str, Value]]]:
-    """(key, row) of each finished task, in `jobs` processes (default: one per core) or by a
-    scheduler.
+class Rows:
+    """The rows of a plan for a case, to be computed."""
 
-    Raises InputError before the first row, RunError.
-    """
-    if not tasks:
-        return iter(())
-    first = next(iter(tasks.values()))
-    if first.search:
-        first.search()  # checks the quantity
-    interface_of(first.case)  # condensed before the processes start, which read it
-    return spread(tasks, number_of(jobs, len(tasks)), scheduler)
+    def __init__(self, case: Case, plan: Plan) -> None:
+        """Raises InputError."""
+        self.case, self.plan = case, plan
+        #: key, values and task of each
+        self.planned = list(planned(case, plan))
+        of_quake = QUAKE_COLUMNS if plan.slip_limit is not None else ()
+        #: columns of the results, of which some have numbers only
+        self.results = [*history_columns(case), *of_quake, *OUTCOME, *plan.critical_columns]
+        self.numeric = [*history_columns(case), "failed"]
+
+    @property
+    def notes(self) -> list[str]:
+        """The notes on rows that their case does not have, the first one on each parameter."""
+        of_case, lines = notes_on_settings(self.case), dict[str, str]()
+        for _, _, task in self.planned:
+            for note in notes_on_settings(task.case):
+                if note not in of_case:
+                    lines.setdefault(note.split()[0], note)
+        return list(lines.values())
+
+    def missing(self, known: Container[str] = ()) -> dict[str, Task]:
+        """The tasks of the rows whose keys are not known."""
+        return {key: task for key, _, task in self.planned if key not in known}
+
+    def compute(
+        self, jobs: int | None = None, scheduler: str | None = None, known: Container[str] = ()
+    ) -> Iterator[tuple[str, dict[str, Value]]]:
+        """(key, results) of each missing row when it is finished, in `jobs` processes (default: one
+        per core) or by a scheduler.
+
+        Raises InputError before the first row, RunError.
+        """
+        tasks = self.missing(known)
+        if not tasks:
+            return iter(())
+        first = next(iter(tasks.values()))
+        if first.search:
+            first.search()  # checks the quantity
+        interface_of(first.case)  # condensed before the processes start, which read it
+        return spread(tasks, number_of(jobs, len(tasks)), scheduler)
 
 
 def meshed(case: Case) -> tuple[Case, str]:
@@ -306,11 +323,7 @@ def meshed(case: Case) -> tuple[Case, str]:
     Raises InputError, RunError.
     """
     with Progress(f"{case.name}, mesh of all rows", bar_format="{desc} {elapsed}", leave=False):
-        (outcome, *_) = accuracy.solve(
-            replace(case, also_uplift=()), engine_of(case, "auto"), lambda *_: None, False
-        )
-    if outcome.error:
-        raise outcome.error
+        outcome = runner.compute(case, fields=False)
     refined = {n: outcome.result.case[n] for n in accuracy.REFINED}
     estimate = outcome.result.info["error_estimate"]["statement"]
     source = source_of(case)
@@ -336,31 +349,27 @@ def sweep(
     InputError, RunError.
     """
     check_jobs(jobs)
-    rows = list(planned(case, plan))
-    values = {key: row for key, row, _ in rows}
-    of_steps = list(history_columns(case))
-    of_quake = QUAKE_COLUMNS if plan.slip_limit is not None else ()
-    results = [*of_steps, *of_quake, *OUTCOME, *plan.critical_columns]
-    columns = ["key", *map(column_of, plan.names), *results]
-    with result_file(out, columns, (*of_steps, "failed")) as (file, done):
-        missing = {key: task for key, _, task in rows if key not in done}
-        computed = compute(missing, jobs, scheduler)
-        for note in notes_on_rows(case, [task.case for _, _, task in rows]):
+    rows = Rows(case, plan)
+    values = {key: row for key, row, _ in rows.planned}
+    columns = ["key", *map(column_of, plan.names), *rows.results]
+    with result_file(out, columns, rows.numeric) as (file, done):
+        computed, missing = rows.compute(jobs, scheduler, done), len(rows.missing(done))
+        for note in rows.notes:
             on_note(note)
         count = 0
         try:
-            for key, result in track(computed, f"sweep {case.name}", len(missing)):
+            for key, result in track(computed, f"sweep {case.name}", missing):
                 if not count:  # of the rows before
                     for ending in (CHART, *STATISTICS):
                         beside(out, ending).unlink(missing_ok=True)
-                cells = *values[key].values(), *(result[c] for c in results)
+                cells = *values[key].values(), *(result[c] for c in rows.results)
                 file.add([key, *(in_file(cell) for cell in cells)])
                 count += 1
         except ProcessKilled:
             raise ProcessKilled(count) from None
         file.check_exists()
         done = file.read()
-    return len(missing), [done[key] for key, *_ in rows]
+    return missing, [done[key] for key, *_ in rows.planned]
 
 
 #: Rows of a sweep that are printed at most; columns beside those varied and of critical values, of
