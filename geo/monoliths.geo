@@ -55,8 +55,8 @@ If(dim == 2)
   Physical Point("toe upstream base") = {middle()};
   Physical Point("heel downstream base") = {middle()};
   Physical Point("toe downstream base") = {toe()};
-  Physical Point("heel contraction") = {top()};
-  Physical Point("toe contraction") = {middle()};
+  Physical Point("heel contraction") = {middle()};
+  Physical Point("toe contraction") = {top()};  // on the downstream face: no water enters there
 Else
   section() = BooleanUnion { Surface{101}; Delete; } { Surface{102}; Delete; };
   Extrude {0, 0, 2 * long} { Surface{1}; }

@@ -12,6 +12,7 @@ import damjoint as dj
 import matplotlib.image
 import numpy as np
 import pytest
+from blocks import write_blocks
 from damjoint.pictures import check_picture
 from damjoint.pictures.check_picture import draw_check, draw_joint
 from damjoint.post import folder as folders
@@ -19,6 +20,7 @@ from damjoint.statics import gravity
 from damjoint.statics.verdict import verdict
 from damjoint.studies import check_study
 from damjoint.studies.check import (
+    UNCHECKED,
     SafetyCheck,
     by_gravity,
     compare_joints,
@@ -616,3 +618,19 @@ def test_the_table_fits_the_terminal_with_named_columns(solve, width):
     wide = text_table(checks).split("\n\n")[1]
     assert max(map(len, wide.splitlines())) > 120 and "[kN/m]" not in wide
     assert (" T " in table.splitlines()[0]) == (width == 120)
+
+
+def test_a_joint_that_others_hold_may_slip_along_its_full_length(tmp_path):
+    """Its SSF is 1 less the hardening; the run stands, and so does the check."""
+    blocks = {"one": (0.0, 0.0, 10.0, 20.0), "two": (10.0, 0.0, 22.0, 20.0)}
+    joints = {"b10": (0, 0, 10, 0), "b1": (10, 0, 22, 0), "between": (10, 0, 10, 20)}
+    write_blocks(tmp_path / "own.msh", blocks, joints, size=4.0)
+    (tmp_path / "own.case").write_text(
+        'geometry = "own.msh"; default_law = "friction"; default_adhesion = 0; levels() = {19};'
+        "default_pena_tang = 1e6; Struct Joint::b10 [mu 1.5]; Struct Joint::b1 [mu 0.2];"
+        'Struct Joint::between [mu 0.5, uplift "none"];'
+    )
+    checks = {c.finite_elements.joint: c for c in dj.check([str(tmp_path / "own.case")])}
+    b1 = checks["b1"].finite_elements
+    assert 0.9 < b1.numbers["SSF"] < 1 and b1.verdict == UNCHECKED and not b1.failures
+    assert checks["b10"].finite_elements.numbers["SSF"] > 3

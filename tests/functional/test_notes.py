@@ -223,3 +223,13 @@ def test_a_single_list_of_the_wrong_length_is_blamed(command, tmp_path):
     code, _, err = command("run", "stepped", "--set", "mu=0.6,0.7")
     assert code == 2 and "mu = 0.6,0.7: must be one value, or one for each joint" in err
     assert "(1: joint)" in err
+
+
+@pytest.mark.parametrize("uplift, noted", [("none", True), ("imposed", False)])
+def test_the_water_of_an_earthquake_needs_uplift(command, mine, uplift, noted):
+    """And no seismic coefficients: the record is there."""
+    mine(f'default_quake_uplift = "zero"; default_uplift = "{uplift}"; levels() = {{9}};')
+    _, _, err = command(*COMMANDS["quake"])
+    note = "damjoint: mine: quake_uplift has no effect; it needs uplift"
+    assert ([line for line in err.splitlines() if "quake_uplift" in line] == [note]) == noted
+    assert "k_h" not in err

@@ -10,6 +10,7 @@ from damjoint.input.resolve import load
 from damjoint.joint.interface import interface_of
 from damjoint.mesh.mesh import mesh_of
 from damjoint.solver.load_stepper import LoadStepper
+from damjoint.statics.notes import notes
 from damjoint.statics.verdict import verdict
 
 WATER = 9810.0
@@ -146,6 +147,38 @@ def test_monoliths_are_in_equilibrium(dim):
     assert contraction.last["U"] == 0
     if dim == 2:  # the downstream block holds what its contraction joint presses
         assert bases[1].last["T"] == pytest.approx(contraction.last["N"], rel=1e-6)
+
+
+def test_water_enters_no_joint_at_the_downstream_face():
+    """Above its end there, 31 m, too: the joint is wet up to the head of the base."""
+    low, high = (
+        LoadStepper(case, interface_of(case)).run().joints
+        for case in (
+            load("monoliths", {"n_joint": 20.0, "uplift": "imposed"}, [level])
+            for level in (31.0, 31.1)
+        )
+    )
+    for before, after in zip(low, high, strict=True):
+        assert after.last["U"] == pytest.approx(before.last["U"], rel=0.01)
+    head = 31.1 * 20 / 34  # where the joints meet
+    assert high[2].last["U"] == pytest.approx(WATER * head**2 / 2, rel=0.01)
+
+
+def test_an_end_beside_the_water_that_it_has_is_noted(tmp_path):
+    """A heel on the crest, where no reservoir stands; a toe on the upstream face."""
+    blocks = {"one": (0.0, 0.0, 10.0, 20.0), "two": (10.0, 0.0, 22.0, 20.0)}
+    bases = {"left": (0, 0, 10, 0), "right": (10, 0, 22, 0)}
+    (tmp_path / "own.case").write_text('geometry = "own.msh"; levels() = {22};')
+    for ends, expected in (
+        ((10, 0, 10, 20), []),
+        ((10, 20, 10, 0), ["heel of joint between: at y = 20 m it lies on no face that the reser"]),
+    ):
+        write_blocks(tmp_path / "own.msh", blocks, bases | {"between": ends}, size=4.0)
+        for uplift in ("imposed", "none"):
+            settings = {"uplift": uplift, "crest_water": 0.0}
+            noted = notes(load(str(tmp_path / "own.case"), settings))
+            found = [note[: len(expected[0])] for note in noted if "heel" in note or "toe" in note]
+            assert found == (expected if uplift == "imposed" else [])
 
 
 def test_lateral_forces_of_each_monolith_balance():

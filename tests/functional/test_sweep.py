@@ -18,6 +18,7 @@ from damjoint.studies import chart, sweep
 from damjoint.studies.plan import plan_of, plan_with
 from damjoint.units import LENGTHS
 from processes import without_progress
+from quakes import smooth_record
 from scipy import stats
 
 
@@ -374,6 +375,22 @@ def test_axes_of_a_chart_suit_what_was_varied(command, tmp_path, monkeypatch):
     assert [text.get_text() for text in opening.texts] == ["zero in all rows"]
     title = factor.figure.get_suptitle()
     assert title == "own dam: 3 rows, law bond, uplift imposed, level 20 m"
+
+
+def test_a_chart_says_that_the_slip_is_not_known(command, tmp_path, monkeypatch):
+    """Of a dam that is not at rest in the end; it is not zero, and the dam does not fail."""
+    smooth_record(tmp_path / "record.csv", 0.1, duration=0.05)
+    (tmp_path / "own.case").write_text(
+        'record = "record.csv"; default_record_unit = "m/s2"; default_record_rest = 0;'
+        "default_order = 1; levels() = {9};"
+    )
+    words = "own.case", "--quake", "0.01", "--vary", "mu=0.5,0.6"
+    panels = chart_panels(command, tmp_path, monkeypatch, *words)
+    slip, block = panels["residual slip"], panels["slip of a rigid block"]
+    assert [text.get_text() for text in slip.texts] == ["no row has a value"]
+    assert [text.get_text() for text in block.texts] == ["zero in all rows"]
+    (legend,) = slip.figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["fails or undecided"]
 
 
 def test_rows_are_printed_in_a_table_that_fits_the_terminal():

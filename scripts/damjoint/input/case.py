@@ -175,11 +175,15 @@ class Case(ParameterValues):
         """Those of `given` that differ from their default, though they matter at no joint."""
         known = declared()
         of_joints = [joint.values for scene in self.scenes() for joint in scene.joints]
+        of_record = {
+            "added_mass": True,
+            "quake_uplift": any(v["uplift"] != "none" for v in of_joints),
+        }
         return tuple(
             name
             for name, value in self.given.items()
             if not any(known[name].matters_in(values) for values in of_joints)
-            and not (self.record and name in ("added_mass", "quake_uplift"))
+            and not (self.record and of_record.get(name))
             and value != constants()[name][0]
         )
 

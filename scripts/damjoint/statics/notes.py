@@ -74,7 +74,8 @@ def settings_in_vain(case: Case) -> Iterator[str]:
     """Yield the parameters that a user has set and that have no effect."""
     known, ineffective = declared(), case.ineffective
     for name in ineffective:
-        yield f"{name} has no effect; it needs {known[name].matters}"
+        dry = case.record and name == "quake_uplift"
+        yield f"{name} has no effect; it needs {'uplift' if dry else known[name].matters}"
     if case.geometry and case.geometry.suffix != ".geo":
         for name in case.given:
             if name in OF_SECTION and name not in ineffective:
@@ -189,6 +190,7 @@ def notes_on_geometry(case: Case, mesh: Mesh) -> Iterator[str]:
             yield "floor_water = 1 has no effect: no face reservoir floor or tailwater bed"
     if case["silt_height"] > 0 and (UP not in sides or case["silt_height"] <= lowest[UP]):
         yield f"silt_height = {case['silt_height']:g} m reaches no face upstream: no silt acts"
+    yield from ends_beside_the_water(case, mesh)
     for where in geometry.gaps_of_support:
         yield f"fixed: has a gap at {where}, where the rock is free"
     if fixed := geometry.fixed_concrete:
@@ -200,3 +202,31 @@ def notes_on_geometry(case: Case, mesh: Mesh) -> Iterator[str]:
         yield f"the mesh has {several} at {cavities[0]}"
     if geometry.height < LOWEST:
         yield f"the dam is {geometry.height:g} m high; is the mesh in another unit?"
+
+
+def ends_beside_the_water(case: Case, mesh: Mesh) -> Iterator[str]:
+    """Yield the heels and toes at which the mesh says that other water stands than its faces say:
+    a heel at no face of the reservoir, a toe at the upstream face.
+    """
+    geometry = mesh.user_geometry
+    nodes = {UP: np.zeros(0, int), TOP: np.zeros(0, int), FLOOR: np.zeros(0, int)}
+    for face in geometry.faces:
+        if face.side in nodes:
+            nodes[face.side] = np.union1d(nodes[face.side], face.surface.node_tags.astype(int))
+    if not len(nodes[UP]) or not case["rho_water"]:
+        return
+    reservoir = np.concatenate(list(nodes.values()))
+    cases = case.joints if case.of_joints else (case,) * len(mesh.joints)
+    for joint, of_joint in zip(mesh.joints, cases, strict=True):
+        outer = [~np.isin(end.node_tags, joint.inner_ends) for end in (joint.heel, joint.toe)]
+        if of_joint["uplift"] == "none":
+            continue
+        name = f" of joint {joint.name}" if len(mesh.joints) > 1 else ""
+        lowest = joint.heel.points[outer[0], 1].min(initial=np.inf)
+        if max(case.levels) > lowest and not np.isin(joint.heel.node_tags, reservoir).any():
+            yield (
+                f"heel{name}: at y = {lowest:.5g} m it lies on no face that the reservoir presses "
+                "on, and water enters there; if it does not, this end is the toe"
+            )
+        if np.isin(joint.toe.node_tags[outer[1]], nodes[UP]).any():
+            yield f"toe{name}: lies on the face upstream, but has the head of the tailwater"

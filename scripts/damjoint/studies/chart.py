@@ -24,6 +24,7 @@ from ..statics.gravity import sliding_factor
 from ..units import LENGTHS, Units, unit
 from .plan import Plan, Row, column_of, numbers
 from .report_input import UNITS
+from .sweep import UNDECIDED
 
 #: Quantities drawn: label and units.
 OPENING = "max_opening"
@@ -247,11 +248,13 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
         if np.nan_to_num(shown).any():
             widen(panel.yaxis)
         else:
-            note_zero(panel, len(shown), len(x))
+            note_zero(panel, int(np.isfinite(shown).sum()), len(x), valued)
     handles, labels = panel.get_legend_handles_labels()
     named = {text: handle for text, handle in zip(labels, handles, strict=True) if text in curves}
     if bad.any():
-        meaning = "not confirmed" if plan.critical else "fails"
+        undecided = any(row["verdict"] in UNDECIDED for row in table.rows)
+        meaning = "fails or undecided" if undecided else "fails"
+        meaning = "not confirmed" if plan.critical else meaning
         (named[meaning],) = panel.plot([], [], "x", color="black" if others else RED)
     named.pop("", None)
     if named:
@@ -259,11 +262,14 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
         figure.legend(list(named.values()), list(named), ncols=min(len(named), 4), **below)
 
 
-def note_zero(panel: Axes, number: int, rows: int) -> None:
-    """Say in a panel that all of the shown values, of so many of the rows, are zero."""
+def note_zero(panel: Axes, number: int, rows: int, valued: bool) -> None:
+    """Say in a panel that all values of a number of the rows are zero, and the others have none;
+    valued: whether rows that fail have values, too.
+    """
     panel.set(yticks=[0] if number else [], ylim=(-1, 1))
-    text = "zero in all rows" if number == rows else "zero in all rows that stand"
-    text = text if number else "all rows fail"
+    text = f"zero in all rows that {'have a value' if valued else 'stand'}"
+    text = "zero in all rows" if number == rows else text
+    text = text if number else ("no row has a value" if valued else "all rows fail")
     panel.text(0.5, 0.6, text, ha="center", transform=panel.transAxes)
 
 

@@ -92,14 +92,18 @@ class MethodResult:
     unjudged: str = ""
     #: whether it lies between bodies that other joints hold: its resultant is not limited
     internal: bool = False
+    #: whether it alone holds what is above it; else it may slip along its full length, with
+    #: SSF = 1 less its hardening, while other joints hold
+    alone: bool = True
 
     @property
     def failures(self) -> list[str]:
         """The statement, and each requirement that is not met."""
         case, numbers = self.case, self.numbers
+        least = required(case) if self.alone else required_by_case(case)
         unmet = [
             f"{name} {numbers[name]:.4g} < {value:g}"
-            for name, value in required(case).items()
+            for name, value in least.items()
             if numbers[name] < value and not self.internal
         ]
         if case["f_c"] and -numbers["sigma_n_toe"] > case["f_c"]:
@@ -179,13 +183,15 @@ def by_gravity(method: GravityMethod, name: str = GRAVITY, partial: bool = False
     )
 
 
-def by_finite_elements(result: Results, statement: str, unjudged: str) -> MethodResult:
+def by_finite_elements(
+    result: Results, statement: str, unjudged: str, alone: bool = True
+) -> MethodResult:
     """Result of a run for a joint, the only one of `result`, at the last level it reached, with
     safety factors from its resultants.
 
     statement: why it fails, or empty; unjudged: why a joint that does not fail can not be judged,
-    or empty. Stresses are node values at the ends of the joint; those of an elastic body depend on
-    the mesh.
+    or empty; alone: see `MethodResult`. Stresses are node values at the ends of the joint; those of
+    an elastic body depend on the mesh.
     """
     case, last, partial = result.case, result.last, result.partial_load
     (joint,) = case.joint_names
@@ -201,7 +207,15 @@ def by_finite_elements(result: Results, statement: str, unjudged: str) -> Method
     numbers |= gravity.factors_of_state(case, last)
     numbers = {name: float(numbers[name]) for name in NUMBERS}
     return MethodResult(
-        case, joint, FINITE_ELEMENTS, last["time"], numbers, statement, partial, unjudged
+        case,
+        joint,
+        FINITE_ELEMENTS,
+        last["time"],
+        numbers,
+        statement,
+        partial,
+        unjudged,
+        alone=alone,
     )
 
 
@@ -226,7 +240,7 @@ def compare_methods(result: Results, statement: str, unjudged: str, alone: bool)
     and `hand_calculation`.
     """
     method = hand_calculation(result, alone)
-    elements = by_finite_elements(result, statement, unjudged)
+    elements = by_finite_elements(result, statement, unjudged, alone)
     accuracy = result.info.get("error_estimate", {}).get("statement", "")
     if not method:
         return SafetyCheck(elements, None, accuracy)
