@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,17 +32,54 @@ def end_of(error: BaseException | None, where: str = "") -> tuple[str, str]:
     return state, f"{state}{where}" + (f": {error}" if str(error) else "")
 
 
-class Session:
+class Record:
+    """The record of a study: run.json, or for rows in a CSV a file beside it."""
+
+    def __init__(self, name: str, path: Path, notes: Sequence[str] = ()) -> None:
+        """name: of the case; notes: on it."""
+        self.name, self.path, self.notes = name, path, notes
+        self.begun = time.perf_counter()
+        #: whether it has the end of the study
+        self.ended = False
+
+    @property
+    def seconds(self) -> float:
+        """Wall seconds since the study has begun."""
+        return time.perf_counter() - self.begun
+
+    def save_without_results(
+        self, state: str, statement: str, entries: Mapping[str, Any] | None = None
+    ) -> None:
+        """Write the record of a study without any equilibrium; entries: further ones."""
+        self.ended = True
+        further = {"notes": self.notes, "wall_seconds": {"all": self.seconds}, **(entries or {})}
+        further |= versions.provenance({})
+        folders.write_state(self.name, self.path, state, statement, further)
+
+    @contextlib.contextmanager
+    def of_block(self) -> Iterator[None]:
+        """Record an early end of the block of a study."""
+        try:
+            versions.git_status()  # runs on another core meanwhile
+            yield
+        except BaseException as error:
+            if not self.ended:
+                state, _ = end_of(error)
+                self.save_without_results(state, str(error) or "no step had converged")
+            raise
+        finally:
+            versions.commit()
+
+
+class Session(Record):
     """A study of a case that has claimed its folder, see `session`."""
 
     def __init__(self, case: Case, out: Path, key: str = "") -> None:
         """key: of all that decides the results, see `finished`; empty: they are not used again."""
+        super().__init__(case.name, out / folders.RECORD, remarks(case))
         self.case, self.out, self.key = case, out, key
-        self.notes, self.begun = remarks(case), time.perf_counter()
         #: saved scenes: results, state and statement
         self.saved: list[tuple[Results, str, str]] = []
-        #: whether run.json has the end of the study
-        self.ended = False
 
     def save(
         self,
@@ -67,16 +104,6 @@ class Session:
         info |= versions.provenance(info.pop("getdp", {})) | {"notes": self.notes}
         folders.write_info(result, folder, state, statement)
 
-    def save_without_results(
-        self, state: str, statement: str, entries: Mapping[str, Any] | None = None
-    ) -> None:
-        """Write run.json of a study without any equilibrium; entries: further ones."""
-        self.ended = True
-        further = {"notes": self.notes, "wall_seconds": {"all": self.seconds}, **(entries or {})}
-        folders.write_state(
-            self.case, self.out, state, statement, further | versions.provenance({})
-        )
-
     def add(self, result: Results, write: Callable[[Path], object]) -> None:
         """Write fields or pictures of a saved scene into its folder; the time is added to that of
         writing its tables.
@@ -88,11 +115,6 @@ class Session:
     def folder(self, result: Results) -> Path:
         """The folder of a scene."""
         return folders.scene_folder(self.case, result.case, self.out)
-
-    @property
-    def seconds(self) -> float:
-        """Wall seconds since the folder was claimed."""
-        return time.perf_counter() - self.begun
 
     def complete(self) -> None:
         """Write run.json again, with the times of fields and pictures, and the key."""
@@ -116,17 +138,9 @@ def session(case: Case, out: Path, keep: bool = False, key: str = "") -> Iterato
     is unsuitable.
     """
     study = Session(case, out, key)
-    with folders.claim_output_folder(case, out, keep):
-        try:
-            versions.git_status()  # runs on another core meanwhile
+    with folders.claim_output_folder(case.name, out, keep):
+        with study.of_block():
             yield study
-        except BaseException as error:
-            if not study.ended:
-                state, _ = end_of(error)
-                study.save_without_results(state, str(error) or "no step had converged")
-            raise
-        finally:
-            versions.commit()
         study.complete()
 
 
@@ -146,5 +160,6 @@ def several(cases: Mapping[Path, Case]) -> Iterator[None]:
         state, _ = end_of(error)
         for out, case in cases.items():
             if (folders.read_info(out) or {}).get("state") == "running":
-                folders.write_state(case, out, state, "ended before its first result")
+                record = out / folders.RECORD
+                folders.write_state(case.name, record, state, "ended before its first result")
         raise

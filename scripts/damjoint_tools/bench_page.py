@@ -13,7 +13,9 @@ import numpy as np
 from damjoint.input.case import Case
 from damjoint.input.resolve import load
 from damjoint.post import validation
+from damjoint.post.folder import COMPLETE, RECORD
 from damjoint.runner import run
+from damjoint.session import Record
 from damjoint.storage import locked_folder
 from tabulate import tabulate
 from threadpoolctl import threadpool_limits
@@ -390,13 +392,14 @@ def of_hard(table: Table) -> list[str]:
 
 
 def bench(out: Path, short: bool) -> None:
-    """Run the benchmark; write tables (CSV), benchmarks.md, modelings.md, accuracy.png and the
-    provenance of all (provenance.json) into out; print the page.
+    """Run the benchmark; write tables (CSV), benchmarks.md, modelings.md, accuracy.png, the
+    provenance of all (provenance.json) and the record (run.json) into out; print the page.
 
     out/measured.jsonl is the log from which an interrupted benchmark is resumed.
     """
     out.mkdir(parents=True, exist_ok=True)
-    with locked_folder(out):
+    record = Record("bench", out / RECORD)
+    with locked_folder(out), record.of_block():
         measurements = Measurements(out / "measured.jsonl", short)
         tables, precise = measure(measurements)
         for name, table in tables.items():
@@ -409,6 +412,7 @@ def bench(out: Path, short: bool) -> None:
         (out / "provenance.json").write_text(json.dumps(last, indent=1) + "\n")
         (out / "benchmarks.md").write_text(text)
         measurements.path.unlink()
+        record.save_without_results(COMPLETE, "", {"bench": {"short": short}})
     print(text)
 
 

@@ -25,7 +25,7 @@ from pathlib import Path
 from damjoint import InputError, RunError
 from damjoint.processes import pool_of
 from damjoint.progress import track
-from damjoint.studies.result_file import result_file
+from damjoint.studies.result_file import rows_session
 from damjoint_witness import again
 from damjoint_witness.earthquake import Shaken
 from damjoint_witness.files import Files
@@ -269,7 +269,8 @@ def stress(
         raise InputError("stress: needs scikit-fem; install it by pip install 'damjoint[test]'")
     now = provenance()
     names = [f"{seed}-{number}" for number in range(count)]
-    with result_file(out, COLUMNS, ("dim", "seconds")) as (file, done):
+    about = {"stress": {"rows": count, "seed": seed, "quake": quake}}
+    with rows_session("stress", out, COLUMNS, ("dim", "seconds"), about) as (study, done):
         for row in done.values():
             if row["code"] != now["code"]:
                 other = f"damjoint {row['version']} ({row['commit'] or row['date']})"
@@ -281,8 +282,8 @@ def stress(
         rows = rows_as_completed(seed, missing, jobs or os.cpu_count() or 1, records)
         for row in track(rows, "stress", len(missing)):
             cells = row | now
-            file.add([str(cells.get(name, "")) for name in COLUMNS])
-        done = file.read()
+            study.add([str(cells.get(name, "")) for name in COLUMNS])
+        done = study.file.read()
     return [done[name] for name in names]
 
 

@@ -184,7 +184,7 @@ def test_what_a_run_leaves_out_is_said_before_it(case_file, tmp_path):
     assert list(quake_getdp.left_out(tmp_path, False)) == []
     (picture,) = quake_getdp.left_out(tmp_path, True)
     assert "--engine getdp draws no picture" in picture
-    folder.write_state(case, tmp_path / "out", "interrupted")
+    folder.write_state(case.name, tmp_path / "out" / folder.RECORD, "interrupted")
     again, _ = quake_getdp.left_out(tmp_path / "out", True)
     assert again.endswith("--engine getdp starts an interrupted earthquake again")
 

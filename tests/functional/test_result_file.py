@@ -1,6 +1,7 @@
 """The result file of a sweep: keys of all that decides a row, interrupts, damage, deletion."""
 
 import csv
+import json
 import os
 import resource
 from dataclasses import replace
@@ -199,7 +200,7 @@ def test_bad_input_and_a_sweep_without_a_row_leave_no_file(command, tmp_path, mo
 
     monkeypatch.setattr(sweep, "last_rows", interrupted)
     code, _, err = command(*WORDS, "--vary", "mu=0.5")
-    assert (code, err) == (130, "damjoint: interrupted\n") and not (tmp_path / "mu.csv").exists()
+    assert (code, err) == (130, "damjoint: interrupted\n") and not list(tmp_path.iterdir())
 
 
 def test_an_interrupt_says_what_is_saved(command, tmp_path, monkeypatch):
@@ -219,3 +220,14 @@ def test_an_interrupt_says_what_is_saved(command, tmp_path, monkeypatch):
     assert (code, err) == (130, "damjoint: interrupted; results finished so far are saved\n")
     assert len(rows(tmp_path / "mu.csv")) == 1
     assert not (tmp_path / "mu.png").exists()  # of the rows before
+    record = json.loads((tmp_path / "mu_run.json").read_text())
+    assert record["state"] == "interrupted" and record["machine"] and record["wall_seconds"]
+    monkeypatch.setattr(sweep, "last_rows", last_rows)
+    for added in (1, 1):  # nothing is missing the second time: the record stays
+        assert command(*WORDS, "--vary", "mu=0.5,0.6")[0] == 0
+        record = json.loads((tmp_path / "mu_run.json").read_text())
+        assert (record["state"], record["rows_added"], record["sweep"]["rows"]) == (
+            "complete",
+            added,
+            2,
+        )

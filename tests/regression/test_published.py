@@ -86,7 +86,9 @@ def test_validate_exits_with_1_if_a_row_fails(command, monkeypatch):
 def test_published_tests_beside_ssnp142(family, tmp_path):
     """Every row of the table has its test, and is within its tolerance."""
     comparisons = list(
-        validate.compare(family, validate.tests_of(family), tmp_path, "auto", picture=False)
+        validate.compare(
+            family, validate.tests_of(family), validate.Options(tmp_path, picture=False)
+        )
     )
     assert {c.reference for c in comparisons} == set(validation.table(family))
     assert {c.verdict for c in comparisons} == {"pass"}, "\n" + validation.report(comparisons)

@@ -26,6 +26,7 @@ def add(command: Parser) -> None:
         default=Path("out"),
         help="folder that gets a folder for each case (default: out)",
     )
+    command.add_jobs()
     command.add_engine(", for cases; tests of a point and of an earthquake: condensed")
 
 
@@ -37,7 +38,8 @@ def call(arguments: argparse.Namespace) -> int:
     families, failed = validate.chosen(arguments.tests), False
     summaries = []
     for family, names in families.items():
-        comparisons = list(validate.compare(family, names, arguments.out, arguments.engine))
+        options = validate.Options(arguments.out, arguments.engine)
+        comparisons = list(validate.compare(family, names, options, arguments.jobs))
         print(f"{family.upper()}: {validation.FAMILIES[family]}\n")
         print(validation.report(comparisons), end="\n\n" if len(families) > 1 else "\n")
         summaries.append(f"{family}: {validation.summary(comparisons)}")

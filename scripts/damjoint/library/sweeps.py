@@ -147,7 +147,7 @@ def sweep(
         ['stands', 'sliding']
     """
     from ..processes import check_jobs
-    from ..studies.sweep import Rows
+    from ..studies.sweep import PlannedRows
 
     check_jobs(jobs)
     if not values and not sample:
@@ -158,7 +158,7 @@ def sweep(
     plan = plan_with(axes, list((tie or {}).items()), sample, {}, critical)
     plan = replace(plan, slip_limit=quake)
     case = on_fixed_mesh(noted(as_case(source)))
-    rows = Rows(case, plan)
+    rows = PlannedRows(case, plan)
     computed = rows.compute(jobs)
     warn(case, rows.notes, 3)
     results = dict(track(computed, "sweep", len(rows.missing())) if progress else computed)

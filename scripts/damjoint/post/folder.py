@@ -25,11 +25,13 @@ from ..statics.statement import statement
 from ..statics.verdict import verdict
 from ..storage import PART, atomic_write, locked_folder
 
+#: The record of a study: case, state, versions, machine, times.
+RECORD = "run.json"
 #: Files of a run: tables, pictures CASE....png, fields.
 TABLES = (
     *("joint.csv", "history.csv", "curve.csv", "steps.csv", "gravity.csv", "critical.csv"),
     *("quake.csv", "quake_joint.csv", "quake_stress.npz", "quake_state.npz"),
-    *("modes.csv", "reliability.csv", "design_point.case", "sensitivity.csv", "run.json"),
+    *("modes.csv", "reliability.csv", "design_point.case", "sensitivity.csv", RECORD),
     *("calibration.csv", "residuals.csv", "calibrated.case"),
 )
 PICTURES = (
@@ -68,9 +70,10 @@ def check_writable(folder: Path) -> None:
 
 
 @contextlib.contextmanager
-def claim_output_folder(case: Case, folder: Path, keep: bool = False) -> Iterator[None]:
+def claim_output_folder(name: str, folder: Path, keep: bool = False) -> Iterator[None]:
     """Create and lock the output folder of a run, and remove an earlier run's results, also the
-    table of a study of which it was a part; keep: not those of a run that is to be continued.
+    table of a study of which it was a part; name: of its case; keep: not those of a run that is to
+    be continued.
 
     Raises InputError if the folder can not be written or is locked; an earlier run stays then.
     """
@@ -78,7 +81,7 @@ def claim_output_folder(case: Case, folder: Path, keep: bool = False) -> Iterato
         if not keep:
             clear(folder)
         remove_tables(folder.resolve().parent, folder.resolve().name)
-        write_state(case, folder, "running")
+        write_state(name, folder / RECORD, "running")
         yield
 
 
@@ -131,7 +134,11 @@ def scene_folders(folder: Path) -> list[Path]:
 
 def read_info(folder: Path) -> dict[str, Any] | None:
     """Read run.json of a folder; None if there is none, or it is not of damjoint."""
-    file = folder / "run.json"
+    return read_record(folder / RECORD)
+
+
+def read_record(file: Path) -> dict[str, Any] | None:
+    """Read the record of a study; None if there is none, or it is not of damjoint."""
     try:
         info: dict[str, Any]
         info = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
@@ -171,8 +178,8 @@ def remove_if_empty(folder: Path) -> None:
 
 
 def write_state(
-    case: Case,
-    folder: Path,
+    name: str,
+    record: Path,
     state: str,
     statement: str = "",
     entries: Mapping[str, Any] | None = None,
@@ -180,9 +187,9 @@ def write_state(
     """Create the folder of a case and write the run.json of a run without results: running,
     interrupted or failed, and why; entries: further ones.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    info = {"case": case.name, "state": state, "statement": statement}
-    write_json(folder, {**info, "versions": {"damjoint": __version__}, **(entries or {})})
+    record.parent.mkdir(parents=True, exist_ok=True)
+    info = {"case": name, "state": state, "statement": statement}
+    write_json(record, {**info, "versions": {"damjoint": __version__}, **(entries or {})})
 
 
 def write_info(results: Results, folder: Path, state: str = "", why: str = "") -> None:
@@ -192,7 +199,7 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
     """
     case = results.case
     write_json(
-        folder,
+        folder / RECORD,
         {
             "case": case.name,
             "title": case.title,
@@ -225,7 +232,7 @@ def stored(case: Case, joint: OfJoint) -> dict[str, Any]:
     return asdict(joint) | {"section": joint.section if case.geometry else {}}
 
 
-def write_json(folder: Path, info: dict[str, Any]) -> None:
+def write_json(record: Path, info: dict[str, Any]) -> None:
     """Write run.json."""
-    with atomic_write(folder / "run.json") as path:
+    with atomic_write(record) as path:
         path.write_text(json.dumps(info, indent=2) + "\n")

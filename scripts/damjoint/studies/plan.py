@@ -239,6 +239,8 @@ def numbers(rows: list[Row], column: str) -> Array:
 
 #: Endings of the files that are made of all rows of a result file, see `beside`.
 CHART, STATISTICS = ".png", ("_probability.csv", "_sensitivity.csv", "_sobol.csv")
+#: Ending of the record of a study beside its result file.
+RECORD = "_run.json"
 
 
 def beside(out: Path, ending: str) -> Path:

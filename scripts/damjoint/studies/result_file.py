@@ -6,14 +6,17 @@ import contextlib
 import csv
 import io
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from .. import InputError, RunError
+from ..post import folder as folders
 from ..post.tables import as_text
+from ..session import Record
 from ..storage import SAVED, lock
-from .plan import Row
+from .plan import RECORD, Row, beside
 
 
 @dataclass(frozen=True)
@@ -139,6 +142,47 @@ def result_file(
                 path.unlink()
     finally:
         os.close(number)
+
+
+class SavedRows(Record):
+    """A study whose rows are added to a result file, with its record beside it from the first row
+    on that it adds.
+    """
+
+    def __init__(self, name: str, file: ResultFile, notes: Sequence[str]) -> None:
+        super().__init__(name, beside(file.path, RECORD), notes)
+        self.file, self.added, self.ended = file, 0, True
+
+    def add(self, cells: Sequence[str]) -> None:
+        """Add a row, see `ResultFile.add`."""
+        if not self.added:
+            folders.write_state(self.name, self.path, "running")
+            self.ended = False
+        self.file.add(cells)
+        self.added += 1
+
+
+@contextlib.contextmanager
+def rows_session(
+    name: str,
+    path: Path,
+    columns: Sequence[str],
+    numeric: Sequence[str],
+    entries: Mapping[str, Any],
+    notes: Sequence[str] = (),
+) -> Iterator[tuple[SavedRows, dict[str, Row]]]:
+    """The life of a study whose rows are in a CSV, as `session` for one in a folder.
+
+    name: of its case; entries: of its record; see `result_file`, also for what it raises.
+    """
+    with result_file(path, columns, numeric) as (file, done):
+        study = SavedRows(name, file, notes)
+        with study.of_block():
+            yield study, done
+            file.check_exists()
+        recorded = (folders.read_record(study.path) or {}).get("state") == folders.COMPLETE
+        if study.added or (done and not recorded):
+            study.save_without_results(folders.COMPLETE, "", {**entries, "rows_added": study.added})
 
 
 def line_of(cells: Sequence[str]) -> str:

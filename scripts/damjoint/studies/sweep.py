@@ -25,7 +25,7 @@ from ..processes import ProcessKilled, as_finished, check_jobs, number_of
 from ..progress import Progress, track
 from ..solver.load_stepper import LoadStepper
 from ..statics.limit import mechanism
-from ..statics.notes import notes_on_settings
+from ..statics.notes import notes_on_settings, remarks
 from ..statics.statement import statement
 from ..statics.verdict import failed, verdict
 from ..threads import limited_threads
@@ -33,7 +33,7 @@ from . import keys, quake, quake_summary
 from .critical import QUICK, Search
 from .plan import CHART, STATISTICS, Plan, Row, beside, cases_of, column_of, in_file
 from .quake_summary import NO_FRICTION, NOT_AT_REST, QUAKE_COLUMNS
-from .result_file import result_file
+from .result_file import rows_session
 
 
 def key_of(case: Case, plan: Plan) -> str:
@@ -271,7 +271,7 @@ def spread_bundles(
             yield from zip(work[number], rows, strict=True)
 
 
-class Rows:
+class PlannedRows:
     """The rows of a plan for a case, to be computed."""
 
     def __init__(self, case: Case, plan: Plan) -> None:
@@ -293,6 +293,13 @@ class Rows:
                 if note not in of_case:
                     lines.setdefault(note.split()[0], note)
         return list(lines.values())
+
+    def as_json(self) -> dict[str, Any]:
+        """The entries of its record; of random values only the names."""
+        plan, case = self.plan, self.case
+        about = {"rows": len(self.planned), "vary": plan.varied, "sample": [*plan.sampled]}
+        about |= {"tie": plan.tied, "critical": plan.critical, "slip_limit": plan.slip_limit}
+        return {"sweep": about, "parameters": case.values, "levels": case.levels}
 
     def missing(self, known: Container[str] = ()) -> dict[str, Task]:
         """The tasks of the rows whose keys are not known."""
@@ -349,26 +356,27 @@ def sweep(
     InputError, RunError.
     """
     check_jobs(jobs)
-    rows = Rows(case, plan)
+    rows = PlannedRows(case, plan)
     values = {key: row for key, row, _ in rows.planned}
     columns = ["key", *map(column_of, plan.names), *rows.results]
-    with result_file(out, columns, rows.numeric) as (file, done):
+    notes = [*remarks(case), *rows.notes]
+    with rows_session(case.name, out, columns, rows.numeric, rows.as_json(), notes) as (
+        study,
+        done,
+    ):
         computed, missing = rows.compute(jobs, scheduler, done), len(rows.missing(done))
         for note in rows.notes:
             on_note(note)
-        count = 0
         try:
             for key, result in track(computed, f"sweep {case.name}", missing):
-                if not count:  # of the rows before
+                if not study.added:  # of the rows before
                     for ending in (CHART, *STATISTICS):
                         beside(out, ending).unlink(missing_ok=True)
                 cells = *values[key].values(), *(result[c] for c in rows.results)
-                file.add([key, *(in_file(cell) for cell in cells)])
-                count += 1
+                study.add([key, *(in_file(cell) for cell in cells)])
         except ProcessKilled:
-            raise ProcessKilled(count) from None
-        file.check_exists()
-        done = file.read()
+            raise ProcessKilled(study.added) from None
+        done = study.file.read()
     return missing, [done[key] for key, *_ in rows.planned]
 
 

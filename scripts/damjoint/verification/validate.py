@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from ..arrays import Array
 from ..input.resolve import load
 from ..post import validation
 from ..post.validation import FAMILIES, Comparison
+from ..processes import in_processes
 from ..runner import run
 from ..statics.statement import statement
 from . import law_tests, quake_tests
@@ -59,20 +61,38 @@ def family_of(name: str) -> str:
     return references[0].family
 
 
+@dataclass(frozen=True)
+class Options:
+    """How tests are run: folder of the results of cases, engine, whether pictures are drawn."""
+
+    out: Path
+    engine: str = "auto"
+    picture: bool = True
+
+
 def compare(
-    family: str, names: Sequence[str], out: Path, engine: str, picture: bool = True
+    family: str, names: Sequence[str], options: Options, jobs: int | None = 1
 ) -> Iterator[Comparison]:
-    """Run tests of a family, cases with their results in folders in `out`.
+    """Run tests of a family in so many processes (None: one per core).
 
     Raises RunError if a case stops before its last level.
     """
+    tasks = [(family, name, options) for name in names]
+    compared = dict(in_processes(compare_test, tasks, jobs, family))
+    for number in range(len(tasks)):
+        yield from compared[number]
+
+
+def compare_test(task: tuple[str, str, Options], progress: bool) -> list[Comparison]:
+    """Run a test of a family."""
+    family, name, options = task
     others = tests_without_case(family)
-    for name in names:
-        if name in others:
-            yield from validation.compare_steps(family, name, others[name]())
-            continue
-        case = load(name)
-        for result in run(case, out / case.name, False, picture, engine=engine):
-            if result.stopped:
-                raise RunError(f"{case.name}: {statement(result)}")
-            yield from validation.compare(result)
+    if name in others:
+        return list(validation.compare_steps(family, name, others[name]()))
+    case, compared = load(name), list[Comparison]()
+    out, engine = options.out / case.name, options.engine
+    for result in run(case, out, False, options.picture, progress, engine):
+        if result.stopped:
+            raise RunError(f"{case.name}: {statement(result)}")
+        compared += validation.compare(result)
+    return compared
