@@ -24,7 +24,7 @@ from damjoint.input.resolve import load
 from damjoint.joint import linear_system
 from damjoint.post import stored
 from damjoint.post.field_files import everywhere
-from damjoint.solver.history import joint_row
+from damjoint.solver.history import JointState
 from damjoint.studies import chart, outcome, quake_picture, quake_study, quake_summary, sweep
 from damjoint.studies.plan import Plan
 from damjoint.studies.quake import QuakeRun
@@ -156,7 +156,7 @@ def test_momentum_is_balanced_at_every_step(tmp_path, alpha, vertical, rock_mass
     quake = earthquake(record, DAM | settings, "40")
     resultant, _ = body_inertia(quake, Bodies.of(quake.case))
     equilibrium = quake.problem.model.equilibrium
-    forces = lambda state: np.array([joint_row(equilibrium, state, 0)[n] for n in "TN"])
+    forces = lambda state: np.array([JointState(equilibrium, state, 0).row[n] for n in "TN"])
     ones = resultant(quake.system.translation(joint_of(quake), ["dam"], np.array([1.0, 0])))[0]
     static = before = forces(quake.problem.static)
     ground_before, worst, slid = np.zeros(2), 0.0, 0.0
@@ -343,11 +343,11 @@ def test_water_in_the_joint_during_an_earthquake(tmp_path, mode, uplift):
         settings = DAM | {"quake_uplift": value, "uplift": uplift, "n_joint": 20.0}
         quake = earthquake(record, settings, "30")
         equilibrium = quake.problem.model.equilibrium
-        rows = [joint_row(equilibrium, step.end.state, 0) for step in quake.steps()]
+        rows = [JointState(equilibrium, step.end.state, 0).row for step in quake.steps()]
         return np.array([[row["U"], row["crack_length"]] for row in rows]), quake
 
     changed, quake = uplifts(mode)
-    static = joint_row(quake.problem.model.equilibrium, quake.problem.static, 0)
+    static = JointState(quake.problem.model.equilibrium, quake.problem.static, 0).row
     assert changed[:, 1].max() > 5
     if mode == "zero":
         open_before = changed[:-1, 1] > 2
@@ -364,9 +364,9 @@ def test_water_returns_to_a_crack_that_closes(tmp_path):
     settings = DAM | {"law": "rupture", "sigma_max": 2e5, "quake_uplift": "zero"}
     quake = earthquake(smooth_record(tmp_path / "r.csv", 5.0, duration=0.6), settings, "30")
     equilibrium, joint, begin = quake.problem.model.equilibrium, joint_of(quake), quake.now.state
-    static, closed_again = joint_row(equilibrium, begin, 0)["U"], 0
+    static, closed_again = JointState(equilibrium, begin, 0).row["U"], 0
     for step in quake.steps():
-        row = joint_row(equilibrium, step.end.state, 0)
+        row = JointState(equilibrium, step.end.state, 0).row
         opening = joint.jumps(joint.at_points, begin.jump)[:, 0].max()
         if opening <= 0:
             assert row["U"] == pytest.approx(static)
@@ -458,7 +458,7 @@ def test_momentum_above_each_of_several_joints(tmp_path):
     settings = DAM | {"lift_heights": (15.0, 30.0), "hht_alpha": 0.0, "added_mass": 0.0}
     quake = earthquake(record, settings | {"mu": (1.2, 0.7, 0.9)}, "40")
     equilibrium, system = quake.problem.model.equilibrium, quake.system
-    forces = lambda state: np.array([joint_row(equilibrium, state, k)["T"] for k in range(3)])
+    forces = lambda state: np.array([JointState(equilibrium, state, k).row["T"] for k in range(3)])
     static, slid = forces(quake.problem.static), np.zeros(3)
     rigid = [
         system.translation(joint_of(quake, k), quake.case.graph.separated([k]), np.array([1.0, 0]))

@@ -4,7 +4,7 @@ dam adds to them leaves through the boundary.
 
 import numpy as np
 import pytest
-from damjoint.solver.history import joint_row
+from damjoint.solver.history import JointState
 from quakes import BLOCK, DAM, earthquake, joint_of, mean_slip, smooth_record, write_record
 
 DEPTH, WIDTH, DENSITY = 40.0, 10.0, 2400.0
@@ -146,7 +146,7 @@ def test_a_section_of_any_thickness_is_in_plane_strain(tmp_path):
         quake = earthquake(record, settings, "30")
         joint, steps = joint_of(quake), list(quake.steps())
         equilibrium = quake.problem.model.equilibrium
-        shear = [joint_row(equilibrium, step.end.state, 0)["T"] for step in steps]
+        shear = [JointState(equilibrium, step.end.state, 0).row["T"] for step in steps]
         results.append((mean_slip(quake), *np.percentile(shear, [0, 50, 100]), joint.width))
     (plane, thick) = np.array(results)
     assert thick[:-1] == pytest.approx(plane[:-1], rel=2e-2) and abs(plane[0]) > 5e-3

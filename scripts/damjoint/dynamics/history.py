@@ -2,43 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..arrays import Array, Table
 from ..model.results import IN_TIME, column_of, quake_columns
-from ..solver.history import joint_row
-from ..solver.state import State
+from ..solver.history import JointState
 from .frames import Frames
 from .step import Moving
 from .stepper import Converged, Earthquake
 
 
-def at_ends(quake: Earthquake, state: State, number: int) -> tuple[Array, Array]:
-    """delta_n and delta_t1 of a joint, by its number, at its heel and at its toe (2,)."""
-    joint = quake.problem.model.equilibrium.interface.joints[number]
-    nodes = joint.mean_at_nodes(joint.jumps(joint.at_nodes, state.jump))
-    heel, toe = (nodes[n].mean(axis=0)[:2] for n in (joint.mesh.heel_nodes, joint.mesh.toe_nodes))
-    return heel, toe
-
-
-def row_of_joint(quake: Earthquake, state: State, number: int) -> dict[str, float]:
-    """QUAKE_OF_JOINTS of a joint, by its number, at a state."""
-    equilibrium, static = quake.problem.model.equilibrium, quake.problem.static
-    joint, law = equilibrium.interface.joints[number], equilibrium.laws.laws[number]
-    row = joint_row(equilibrium, state, number)
-    heel, toe = at_ends(quake, state, number)
-    heel_before, toe_before = at_ends(quake, static, number)
-    jump, before = (joint.jumps(joint.at_points, s.jump) for s in (state, static))
-    variables, weights = state.variables.joints[number], joint.points.weights
-    traction, _ = law.traction_and_tangent(jump, variables)
+def row_of_joint(at: JointState, before: JointState) -> dict[str, float]:
+    """QUAKE_OF_JOINTS of a joint at a state; before: at the static one."""
+    joint, law, row = at.joint, at.law, at.row
+    (heel, toe), (heel_before, toe_before) = at.ends, before.ends
+    jump, variables, weights = at.jump, at.variables, joint.points.weights
     damage, slip = law.damage(jump, variables), law.slip(variables, len(jump))
-    strength = weights @ law.shear_strength(traction[:, 0], damage, slip) / joint.width
+    strength = weights @ law.shear_strength(at.traction[:, 0], damage, slip) / joint.width
     return {
         "heel_opening": heel[0],
         "toe_opening": toe[0],
-        "slip_mean": weights @ (jump - before)[:, 1] / weights.sum(),
+        "slip_mean": weights @ (jump - before.jump)[:, 1] / weights.sum(),
         "slip_heel": heel[1] - heel_before[1],
         "slip_toe": toe[1] - toe_before[1],
         **{name: row[name] for name in ("N", "T", "M", "U")},
@@ -49,13 +35,9 @@ def row_of_joint(quake: Earthquake, state: State, number: int) -> dict[str, floa
     }
 
 
-def stress_at_nodes(quake: Earthquake, state: State) -> Array:
-    """Effective normal stress (nodes,) [Pa] at the nodes of the first joint, from heel to toe."""
-    equilibrium = quake.problem.model.equilibrium
-    joint, law = equilibrium.interface.joints[0], equilibrium.laws.laws[0]
-    jump = joint.jumps(joint.at_nodes, state.jump)
-    traction, _ = law.traction_and_tangent(jump, state.node_variables.joints[0])
-    return joint.mean_at_nodes(traction[:, 0])[np.argsort(joint.xi)]
+def stress_at_nodes(at: JointState) -> Array:
+    """Effective normal stress (nodes,) [Pa] at the nodes of a joint, from heel to toe."""
+    return at.joint.mean_at_nodes(at.node_traction[:, 0])[np.argsort(at.joint.xi)]
 
 
 #: States whose displacement is stored: column of quake.csv and sign.
@@ -86,6 +68,8 @@ class QuakeHistory:
     frames: Frames
     #: see `System.resultants`, of each joint
     inertia: list[Array]
+    #: the joints in the static state
+    before: list[JointState]
     #: effective normal stress at the first joint's nodes, from heel to toe, of each row [Pa]
     stress: list[Array] = field(default_factory=list)
     #: by PEAK_STATES
@@ -97,11 +81,13 @@ class QuakeHistory:
     @staticmethod
     def of(quake: Earthquake, span: tuple[float, float] | None = None) -> QuakeHistory:
         """No rows, and the frame of the static state; span: as in `Frames`."""
-        joints, graph = quake.problem.model.equilibrium.interface.joints, quake.case.graph
+        equilibrium, graph = quake.problem.model.equilibrium, quake.case.graph
+        joints, static = equilibrium.interface.joints, quake.problem.static
         return QuakeHistory(
             {name: [] for name in quake_columns(quake.case)},
             Frames.of(quake, span),
             [quake.system.resultants(j, graph.separated([k])) for k, j in enumerate(joints)],
+            [JointState(equilibrium, static, k) for k in range(len(joints))],
         )
 
     def __len__(self) -> int:
@@ -133,12 +119,13 @@ class QuakeHistory:
             "dt": step.dt,
             "residual": step.residual,
         }
-        for k in range(len(quake.case.joints)):
-            of_joint = row_of_joint(quake, state, k)
+        joints = [replace(before, state=state) for before in self.before]
+        for k, at in enumerate(joints):
+            of_joint = row_of_joint(at, self.before[k])
             forces = self.inertia[k] @ np.concatenate([motion.acceleration, step.ground])
             of_joint |= dict(zip(("T_inertia", "N_inertia", "M_inertia"), forces, strict=True))
             row |= {column_of(name, k): value for name, value in of_joint.items()}
-        stress = stress_at_nodes(quake, state)
+        stress = stress_at_nodes(joints[0])
         for name, values in self.rows.items():
             values.append(float(row[name]))
         self.stress.append(stress)

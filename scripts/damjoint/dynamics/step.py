@@ -120,12 +120,12 @@ class TimeStep:
         joints = self.joint_problem(begin, start.variables, self.on_jumps(begin, loads, lifted))
         joints = replace(joints, water=water)
         ahead = now.jump + self.dt * begin.motion.velocity[self.problem.system.jumps]
-        size = lambda jump: float(np.linalg.norm(joints.residual(jump, loading).value))
-        guess = min(now.jump, ahead, key=size)
+        both = ((jump, joints.residual(jump, loading)) for jump in (now.jump, ahead))
+        guess, residual = min(both, key=lambda pair: float(np.linalg.norm(pair[1].value)))
         strategies = model.strategies
         if not persist:  # where points stick and slip by turns, only a descent of the residual ends
             strategies = strategies[0], replace(strategies[0], growth=1.0)
-        starts = [Start(strategy, guess, loading.level) for strategy in strategies]
+        starts = [Start(strategy, guess, loading.level, residual) for strategy in strategies]
         try:
             solution = solve(joints, loading, Plan(starts, model.convergence, persist))
         except NotConverged as error:
@@ -140,8 +140,8 @@ class TimeStep:
             state = replace(state, stored=tuple(replace(s, begin=None) for s in stored))
             lifted = lift(equilibrium, pressure)
         state = replace(state, pressures=pressure).after(now).traced(now, False)
-        residual = solution.size / (model.reference or 1.0)
-        step = StepResult(state, solution.iterations, residual, solution.criterion)
+        size = solution.size / (model.reference or 1.0)
+        step = StepResult(state, solution.iterations, size, solution.criterion)
         return self.moved(begin, state, joints, lifted), step
 
     def water_in_time(self, begin: State, variables: JointVariables) -> StepWater:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -58,12 +59,12 @@ class JointMesh:
         """The surface as a part of the body above or below it."""
         return replace(self.surface, node_tags=self.upper_tags) if above else self.surface
 
-    @property
+    @cached_property
     def heel_nodes(self) -> IntArray:
         """Indices of the surface's nodes at the heel."""
         return np.flatnonzero(np.isin(self.surface.node_tags, self.heel.node_tags))
 
-    @property
+    @cached_property
     def toe_nodes(self) -> IntArray:
         """Indices of the surface's nodes at the toe."""
         return np.flatnonzero(np.isin(self.surface.node_tags, self.toe.node_tags))

@@ -5,6 +5,8 @@ levels.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +14,8 @@ from ..arrays import Array
 from ..input.case import Case
 from ..joint.equilibrium import Equilibrium
 from ..joint.interface import JointInterface
+from ..joint.water import Pressure
+from ..laws import Law
 from ..model.results import (
     HISTORY_OF_JOINTS,
     IN_TIME,
@@ -42,46 +46,143 @@ def recorded(case: Case) -> list[str]:
     return [column_of(name, k) for k in range(len(case.joints)) for name in of_joints]
 
 
-def joint_row(equilibrium: Equilibrium, state: State, number: int) -> dict[str, float]:
-    """RECORDED_OF_JOINTS of a joint, by its number, at a state; with flow in time IN_TIME, too."""
-    joint, law = equilibrium.interface.joints[number], equilibrium.laws.laws[number]
-    variables, pressure = state.variables.joints[number], state.pressures[number]
-    at_points = joint.jumps(joint.at_points, state.jump)
-    traction, _ = law.traction_and_tangent(at_points, variables)
-    weights = joint.points.weights / joint.width
-    frames = joint.frames[joint.points.elements]
-    along_axes = np.einsum("qk,qkc->qc", traction, frames)
-    N, T, M = joint.chord.resultants(weights, joint.points.positions, along_axes)
-    wetted = equilibrium.water[number].wetted.points
-    normals = joint.surface.normals[wetted.elements]
-    water = -pressure.water_points[:, None] * normals
-    U, _, M_U = joint.chord.resultants(wetted.weights / joint.width, wetted.positions, water)
-    return {
-        "crack_length": weights @ law.is_open(at_points, variables),
-        "process_zone": weights @ law.in_process_zone(at_points, variables),
-        "slip_length": weights @ law.has_slipped(variables, len(weights)),
-        "broken_length": weights @ law.is_broken(at_points, variables),
-        "bonded_length": weights @ law.cohesion_left(at_points, variables),
-        "max_opening": joint.jumps(joint.at_nodes, state.jump)[:, 0].max(),
-        "N": N,
-        "T": T,
-        "M": M,
-        "T_z": weights @ along_axes[:, 2],
-        "U": U,
-        "M_U": M_U,
-        "flux": pressure.leakage,
-        "heel": joint.heel @ state.jump,
-        **(in_time(equilibrium, state, number) if state.stored else {}),
-    }
+@dataclass(frozen=True)
+class JointState:
+    """A joint, by its number, at a state."""
 
+    equilibrium: Equilibrium
+    state: State
+    number: int
 
-def in_time(equilibrium: Equilibrium, state: State, number: int) -> dict[str, float]:
-    """The columns IN_TIME of a joint, by its number, at a state; zero without flowing water."""
-    water = equilibrium.water[number]
-    if water.system not in equilibrium.flowing:
-        return dict.fromkeys(IN_TIME, 0.0)
-    stored = state.stored[equilibrium.flowing.index(water.system)]
-    return water.in_time(stored, state.pressures[number])
+    @property
+    def joint(self) -> JointInterface:
+        """The joint."""
+        return self.equilibrium.interface.joints[self.number]
+
+    @property
+    def law(self) -> Law[Any]:
+        """Its law."""
+        return self.equilibrium.laws.laws[self.number]
+
+    @property
+    def variables(self) -> Any:
+        """Internal variables of its Gauss points."""
+        return self.state.variables.joints[self.number]
+
+    @property
+    def node_variables(self) -> Any:
+        """Internal variables of its nodes, by the joint's `rows`."""
+        return self.state.node_variables.joints[self.number]
+
+    @property
+    def pressure(self) -> Pressure:
+        """Of the water in it."""
+        return self.state.pressures[self.number]
+
+    @cached_property
+    def jump(self) -> Array:
+        """At its Gauss points (q, 3) [m]."""
+        return self.joint.jumps(self.joint.at_points, self.state.jump)
+
+    @cached_property
+    def traction(self) -> Array:
+        """At its Gauss points (q, 3) [Pa]."""
+        return self.law.traction_and_tangent(self.jump, self.variables)[0]
+
+    @cached_property
+    def node_jump(self) -> Array:
+        """At its nodes (rows, 3) [m]."""
+        return self.joint.jumps(self.joint.at_nodes, self.state.jump)
+
+    @cached_property
+    def node_traction(self) -> Array:
+        """At its nodes (rows, 3) [Pa]."""
+        return self.law.traction_and_tangent(self.node_jump, self.node_variables)[0]
+
+    @cached_property
+    def ends(self) -> tuple[Array, Array]:
+        """delta_n and delta_t1 at its heel and at its toe (2,) [m]."""
+        nodes, mesh = self.joint.mean_at_nodes(self.node_jump), self.joint.mesh
+        heel, toe = (nodes[n].mean(axis=0)[:2] for n in (mesh.heel_nodes, mesh.toe_nodes))
+        return heel, toe
+
+    @cached_property
+    def row(self) -> dict[str, float]:
+        """RECORDED_OF_JOINTS; with flow in time IN_TIME, too."""
+        joint, law, jump, variables = self.joint, self.law, self.jump, self.variables
+        weights = joint.points.weights / joint.width
+        frames = joint.frames[joint.points.elements]
+        along_axes = np.einsum("qk,qkc->qc", self.traction, frames)
+        N, T, M = joint.chord.resultants(weights, joint.points.positions, along_axes)
+        wetted = self.equilibrium.water[self.number].wetted.points
+        normals = joint.surface.normals[wetted.elements]
+        water = -self.pressure.water_points[:, None] * normals
+        U, _, M_U = joint.chord.resultants(wetted.weights / joint.width, wetted.positions, water)
+        return {
+            "crack_length": weights @ law.is_open(jump, variables),
+            "process_zone": weights @ law.in_process_zone(jump, variables),
+            "slip_length": weights @ law.has_slipped(variables, len(weights)),
+            "broken_length": weights @ law.is_broken(jump, variables),
+            "bonded_length": weights @ law.cohesion_left(jump, variables),
+            "max_opening": self.node_jump[:, 0].max(),
+            "N": N,
+            "T": T,
+            "M": M,
+            "T_z": weights @ along_axes[:, 2],
+            "U": U,
+            "M_U": M_U,
+            "flux": self.pressure.leakage,
+            "heel": joint.heel @ self.state.jump,
+            **(self.in_time if self.state.stored else {}),
+        }
+
+    @property
+    def in_time(self) -> dict[str, float]:
+        """The columns IN_TIME; zero without flowing water."""
+        water, flowing = self.equilibrium.water[self.number], self.equilibrium.flowing
+        if water.system not in flowing:
+            return dict.fromkeys(IN_TIME, 0.0)
+        return water.in_time(self.state.stored[flowing.index(water.system)], self.pressure)
+
+    def table(self) -> tuple[Array, Array]:
+        """Its rows, node by node, columns `joint_columns` but for sigma_n_eff; and the same with
+        jump and stress extrapolated from the Gauss points.
+        """
+        joint, law, variables = self.joint, self.law, self.node_variables
+        pressure, locations, jump = self.pressure, joint.space.locations, self.node_jump
+        damage, slip = law.damage(jump, variables), law.slip(variables, len(jump))
+        nodes = joint.mean_at_nodes(np.column_stack([jump, self.node_traction, damage, slip]))
+        nodes[:, 3] -= pressure.nodes
+        columns = {
+            "time": np.full(len(locations), self.state.time),
+            "level": np.full(len(locations), self.state.loading.level),
+            "joint": np.full(len(locations), self.number + 1.0),
+            **dict(zip("xyz", locations.T, strict=True)),
+            **dict(zip(JUMP_AND_STRESS, nodes.T, strict=False)),
+            "p": pressure.nodes,
+            "damage": nodes[:, 6],
+            "slip": nodes[:, 7],
+            "s": joint.xi * joint.length,
+        }
+        case = self.equilibrium.case
+        if THICKNESS.keys() & joint_columns(case.joints[self.number]).keys():
+            added = law.added_thickness(variables, len(jump))
+            columns |= dict.fromkeys(THICKNESS, joint.mean_at_nodes(added))
+        of_law = law.column_values(variables)
+        columns |= {name: joint.mean_at_nodes(of_law[name]) for name in law.columns}
+        if pressure.flux is not None:
+            columns["flux"] = node_means(joint, pressure.flux)
+        stress = self.traction.copy()
+        stress[:, 0] -= pressure.points
+        extrapolated = {name: columns[name].copy() for name in JUMP_AND_STRESS}
+        at_corners = joint.extrapolate(np.hstack([self.jump, stress]))
+        for name, values in zip(JUMP_AND_STRESS, at_corners.T, strict=True):
+            extrapolated[name][: len(joint.surface.points)] = values
+        nothing = np.full(len(locations), np.nan)  # of a column that only other joints have
+        names = [name for name in joint_columns(case) if name != "sigma_n_eff"]
+        tables = columns, columns | extrapolated
+        one, other = (np.column_stack([t.get(name, nothing) for name in names]) for t in tables)
+        return one, other
 
 
 @dataclass
@@ -150,7 +251,7 @@ class History:
             "crest_ux": self.crest(state),
         }
         for k in range(len(equilibrium.interface.joints)):
-            of_joint = joint_row(equilibrium, state, k)
+            of_joint = JointState(equilibrium, state, k).row
             row |= {column_of(name, k): value for name, value in of_joint.items()}
         for name, values in self.rows.items():
             values.append(float(row[name]))
@@ -167,7 +268,7 @@ class History:
         from the Gauss points.
         """
         parts = [
-            joint_rows(self.equilibrium, state, k)
+            JointState(self.equilibrium, state, k).table()
             for k in range(len(self.equilibrium.interface.joints))
         ]
         self.saved.append(state)
@@ -179,50 +280,6 @@ class History:
         rows = {name: np.array(values, float) for name, values in self.rows.items()}
         joint, extrapolated = (joint_table(case, [t[k] for t in self.tables]) for k in (0, 1))
         return Results(case, history_table(case, rows), joint, extrapolated, stopped, rows["heel"])
-
-
-def joint_rows(equilibrium: Equilibrium, state: State, number: int) -> tuple[Array, Array]:
-    """The rows of a joint, by its number, at a state: node by node, columns `joint_columns` but for
-    sigma_n_eff; and the same with jump and stress extrapolated from the Gauss points.
-    """
-    joint, law = equilibrium.interface.joints[number], equilibrium.laws.laws[number]
-    variables, pressure = state.node_variables.joints[number], state.pressures[number]
-    locations, corners = joint.space.locations, len(joint.surface.points)
-    jump = joint.jumps(joint.at_nodes, state.jump)
-    traction, _ = law.traction_and_tangent(jump, variables)
-    damage, slip = law.damage(jump, variables), law.slip(variables, len(jump))
-    nodes = joint.mean_at_nodes(np.column_stack([jump, traction, damage, slip]))
-    nodes[:, 3] -= pressure.nodes
-    columns = {
-        "time": np.full(len(locations), state.time),
-        "level": np.full(len(locations), state.loading.level),
-        "joint": np.full(len(locations), number + 1.0),
-        **dict(zip("xyz", locations.T, strict=True)),
-        **dict(zip(JUMP_AND_STRESS, nodes.T, strict=False)),
-        "p": pressure.nodes,
-        "damage": nodes[:, 6],
-        "slip": nodes[:, 7],
-        "s": joint.xi * joint.length,
-    }
-    if THICKNESS.keys() & joint_columns(equilibrium.case.joints[number]).keys():
-        added = law.added_thickness(variables, len(jump))
-        columns |= dict.fromkeys(THICKNESS, joint.mean_at_nodes(added))
-    of_law = law.column_values(variables)
-    columns |= {name: joint.mean_at_nodes(of_law[name]) for name in law.columns}
-    if pressure.flux is not None:
-        columns["flux"] = node_means(joint, pressure.flux)
-    at_points = joint.jumps(joint.at_points, state.jump)
-    stress, _ = law.traction_and_tangent(at_points, state.variables.joints[number])
-    stress[:, 0] -= pressure.points
-    extrapolated = {name: columns[name].copy() for name in JUMP_AND_STRESS}
-    at_corners = joint.extrapolate(np.hstack([at_points, stress]))
-    for name, values in zip(JUMP_AND_STRESS, at_corners.T, strict=True):
-        extrapolated[name][:corners] = values
-    nothing = np.full(len(locations), np.nan)  # of a column that only other joints have
-    names = [name for name in joint_columns(equilibrium.case) if name != "sigma_n_eff"]
-    tables = columns, columns | extrapolated
-    one, other = (np.column_stack([t.get(name, nothing) for name in names]) for t in tables)
-    return one, other
 
 
 #: Columns of joint.csv that are also extrapolated from the Gauss points.

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..joint.linear_system import Border
-from ..joint.problem import JointProblem
+from ..joint.problem import JointProblem, Residual
 from ..model.loads import Loading
 from .newton import Convergence, Diverged, Iterate, NotConverged, Strategy, newton
 
@@ -42,6 +42,8 @@ class Start:
     strategy: Strategy
     jump: Array
     level: float
+    #: there, where it is known
+    residual: Residual | None = None
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,8 @@ def solve_from(
                 releasing = crossing & ((side < 0) | (strategy.release > 1))
                 side = np.where(releasing, 0, side)
         here = replace(loading, level=level)
-        residual = problem.residual(jump, here, releasing)
+        known = begin.residual if last is None and jump is begin.jump else None
+        residual = known or problem.residual(jump, here, releasing)
         size, gap = float(np.linalg.norm(residual.value)), 0.0
         if constraint:
             gap = constraint.gap(jump, here)

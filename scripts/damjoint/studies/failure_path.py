@@ -18,7 +18,7 @@ from ..joint.interface import Interface
 from ..model.loads import Loading
 from ..model.results import HISTORY, Columns, column_of, with_all_joints
 from ..solver.controls import LevelControl
-from ..solver.history import joint_row
+from ..solver.history import JointState
 from ..solver.load_stepper import SAME_TIME, LoadStepper
 from ..solver.path import RISE, EquilibriumPath, Point
 
@@ -360,6 +360,6 @@ def softened(point: Point) -> float:
     """The largest part of a joint that is open or softens."""
     equilibrium, parts = point.model.equilibrium, list[float]()
     for number, joint in enumerate(equilibrium.interface.joints):
-        row = joint_row(equilibrium, point.state, number)
+        row = JointState(equilibrium, point.state, number).row
         parts.append((row["crack_length"] + row["process_zone"]) / joint.length)
     return max(parts)

@@ -31,7 +31,7 @@ from ..model.results import column_of
 from ..progress import Progress
 from ..session import end_of, preparation
 from ..solver.controls import LevelControl
-from ..solver.history import joint_row
+from ..solver.history import JointState
 from ..solver.load_stepper import LoadStepper
 from ..solver.model import Model, StepResult
 from ..solver.state import State, Trace
@@ -333,7 +333,7 @@ def rigid_block(quake: Earthquake, number: int) -> RigidBlock:
     problem, system = quake.problem, quake.system
     equilibrium = problem.model.equilibrium
     joint, law = equilibrium.interface.joints[number], equilibrium.laws.laws[number]
-    row = joint_row(equilibrium, problem.static, number)
+    row = JointState(equilibrium, problem.static, number).row
     above = quake.case.graph.separated([number])
     along, across = (
         system.translation(joint, above, direction)
