@@ -26,6 +26,21 @@ def unit(values: Iterable[np.ndarray], units: Units) -> tuple[str, float]:
     return next((u for u in units if largest * u[1] >= 1), units[-1])
 
 
+#: Units of a time [s], the largest first; least length of a time in its unit.
+TIMES: Units = (("d", 1 / 86400), ("h", 1 / 3600), ("min", 1 / 60), ("s", 1))
+LEAST_TIME = 4.0
+
+
+def unit_of_time(length: float) -> tuple[str, float]:
+    """The first unit of TIMES in which a length [s] is at least LEAST_TIME; name and factor."""
+    return next((u for u in TIMES if length * u[1] >= LEAST_TIME), TIMES[-1])
+
+
+def with_slash(unit: str) -> str:
+    """A parameter's unit as it is printed: in ONELAB's labels a slash would separate groups."""
+    return unit.replace(" per ", "/")
+
+
 def with_unit(value: float, units: Units, digits: int = 4) -> str:
     """Format a value with some digits and its unit."""
     name, factor = unit([np.atleast_1d(value)], units)

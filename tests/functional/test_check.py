@@ -614,10 +614,10 @@ def test_the_table_fits_the_terminal_with_named_columns(solve, width):
     assert first.splitlines()[0] == "dam, base: check: pass; equilibrium: yes"
     assert max(map(len, table.splitlines())) <= width
     heads = table.splitlines()[0].split()
-    assert {"case", "method", "SSF", "OSF", "check"} <= set(heads)
+    assert {"joint", "method", "SSF", "OSF", "check"} <= set(heads)
     wide = text_table(checks).split("\n\n")[1]
     assert max(map(len, wide.splitlines())) > 120 and "[kN/m]" not in wide
-    assert (" T " in table.splitlines()[0]) == (width == 120)
+    assert (" U " in table.splitlines()[0]) == (width == 120)
 
 
 def test_a_joint_that_others_hold_may_slip_along_its_full_length(tmp_path):

@@ -12,7 +12,7 @@ from types import ModuleType
 
 from .. import RUN_GEO, InputError, RunError, __version__
 from ..storage import SAVED
-from .options import Parser
+from .options import Parser, say
 
 #: The commands: names of modules. Each has SUMMARY, `add`, which adds its options, and `call`,
 #: which runs it and returns the exit code.
@@ -128,5 +128,5 @@ def main(argv: list[str] | None = None) -> int:
             message, code = interrupted(), 130  # __main__.py; its signal has ended other processes
     except KeyboardInterrupt:
         message, code = interrupted(), 130
-    print(message, file=sys.stderr)
+    say(message, file=sys.stderr)
     return code

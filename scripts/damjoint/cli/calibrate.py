@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from .cases import load_case
-from .options import Parser, path
+from .options import Parser, path, say
 
 SUMMARY = (
     "find the values of parameters with which a case computes what was measured; exit code 1 if "
@@ -51,7 +51,7 @@ def call(arguments: argparse.Namespace) -> int:
     free = free_of(case, arguments.free)
     out = arguments.out or Path("out") / f"{case.name}_calibrated"
     answer = calibrate(case, free, measurements, out, arguments.jobs, not arguments.no_picture)
-    print("\n".join([*printed_lines(answer), str(out)]))
+    say("\n".join([*printed_lines(answer), str(out)]))
     if answer.findings or not answer.converged:
         return NOT_EXPLAINED
     return NOT_DETERMINED if answer.undetermined else 0

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .. import InputError
+from .options import say
 
 if TYPE_CHECKING:
     from ..input.case import Case
@@ -53,7 +54,7 @@ def load_cases(
 
 def print_note(case: Case, note: str) -> None:
     """Print a note on a case to standard error."""
-    print(f"damjoint: {case.name}: {note}", file=sys.stderr)
+    say(f"damjoint: {case.name}: {note}", file=sys.stderr)
 
 
 def warn_if_slow() -> None:
@@ -61,7 +62,7 @@ def warn_if_slow() -> None:
     from ..fem import factor
 
     if factor.is_slow():
-        print(
+        say(
             f"damjoint: 3D runs take several times longer with {factor.name()} than with MUMPS; "
             "'make setup' installs MUMPS or prints the packages that it needs",
             file=sys.stderr,

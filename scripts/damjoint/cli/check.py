@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from .cases import load_cases
-from .options import CASE, Parser, table_width
+from .options import CASE, Parser, say, table_width
 
 SUMMARY = (
     "safety factors by finite elements and by the gravity method; exit code 1 if one is too "
@@ -39,7 +39,7 @@ def call(arguments: argparse.Namespace) -> int:
 
     checks = check_cases(load_cases(arguments, arguments.cases), arguments.out, arguments.jobs)
     errors = [f"{check.case.name}: {check.accuracy}" for check in checks if check.accuracy]
-    print(
+    say(
         "\n\n".join(
             [text_table(checks, table_width(arguments)), *errors, str(arguments.out / "check.csv")]
         )

@@ -6,7 +6,7 @@ import argparse
 
 from .. import InputError
 from .cases import load_case
-from .options import Parser
+from .options import Parser, say
 
 SUMMARY = (
     "find the level, strength factor or parameter beyond which there is no equilibrium; exit "
@@ -50,7 +50,7 @@ def call(arguments: argparse.Namespace) -> int:
             raise InputError(f"--sensitivity: needs --of level, not --of {arguments.of}")
         names = names_of(case, arguments.sensitivity)
     answer, lines = critical(case, arguments.of, arguments.out, names)
-    print("\n".join(lines))
+    say("\n".join(lines))
     if answer.value is None:
         return NONE
     return 0 if answer.confirmed else NOT_CONFIRMED

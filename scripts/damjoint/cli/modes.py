@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from .cases import load_case
-from .options import Parser
+from .options import Parser, say
 
 SUMMARY = (
     "natural frequencies and shapes, without a record: joints closed, with and without water, on "
@@ -31,5 +31,5 @@ def call(arguments: argparse.Namespace) -> int:
     case = load_case(arguments, arguments.case)
     out = arguments.out or Path("out") / f"{case.name}_modes"
     natural = modes_study.run(case, arguments.number, out, not arguments.no_picture)
-    print(f"{case.name}: {modes_study.about(natural)}; {out}\n\n{modes_study.text(natural)}")
+    say(f"{case.name}: {modes_study.about(natural)}; {out}\n\n{modes_study.text(natural)}")
     return 0

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import shutil
+import sys
+import textwrap
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TextIO
 
 from .. import InputError
 
@@ -209,3 +211,17 @@ class Parser(argparse.ArgumentParser):
 def table_width(arguments: argparse.Namespace) -> int | None:
     """The width of printed tables; None with --wide."""
     return None if arguments.wide else shutil.get_terminal_size().columns
+
+
+def say(*texts: str, end: str = "\n", file: TextIO | None = None) -> None:
+    """Print texts to standard output or a file. On a terminal, lines that are wider are broken
+    between words, but for rows of tables, which have columns two blanks apart.
+    """
+    stream, lines = file or sys.stdout, "\n".join(texts).split("\n")
+    if stream.isatty():
+        width = shutil.get_terminal_size().columns
+        whole = {"break_long_words": False, "break_on_hyphens": False}
+        lines = [
+            line if "  " in line.strip() else textwrap.fill(line, width, **whole) for line in lines
+        ]
+    print("\n".join(lines), end=end, file=stream)

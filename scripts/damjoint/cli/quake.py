@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from .cases import load_cases
-from .options import Checked, Parser, path, table_width, time_span
+from .options import Checked, Parser, path, say, table_width, time_span
 
 SUMMARY = (
     "the dam through recorded earthquakes, after its static loads; continues if it was "
@@ -64,13 +64,13 @@ def call(arguments: argparse.Namespace) -> int:
         check(case, options)
     if arguments.engine == "getdp":
         for line in quake_getdp.left_out(out, picture):
-            print(f"damjoint: {line}", file=sys.stderr)
+            say(f"damjoint: {line}", file=sys.stderr)
     results = run_records(cases, out, options, arguments.jobs)
     for result in results:
         steps = f"{result.summary['steps']} steps; {result.out}"
-        print(f"{result.case.name}: {result.statement}; {steps}\n")
+        say(f"{result.case.name}: {result.statement}; {steps}\n")
         tables = text(result.case, result.summary, table_width(arguments))
-        print(tables, end="\n\n" if len(results) > 1 else "\n")
+        say(tables, end="\n\n" if len(results) > 1 else "\n")
     if len(results) > 1:
-        print(records_table(results, table_width(arguments)))
+        say(records_table(results, table_width(arguments)))
     return int(not all(result.stands for result in results))

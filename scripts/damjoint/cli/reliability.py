@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .. import InputError
 from .cases import load_case
-from .options import Parser
+from .options import Parser, say
 
 SUMMARY = (
     "probability that the water rises beyond the critical level: FORM, SORM, importance "
@@ -71,7 +71,7 @@ def call(arguments: argparse.Namespace) -> int:
     out = arguments.out or Path("out") / f"{case.name}_reliability"
     options = arguments.samples, arguments.seed, out, arguments.jobs, arguments.scheduler
     _, lines = reliability(case, variables, *options)
-    print("\n".join(lines))
+    say("\n".join(lines))
     return 0
 
 

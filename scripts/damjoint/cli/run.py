@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .cases import load_case
-from .options import Parser, table_width
+from .options import Parser, say, table_width
 
 if TYPE_CHECKING:
     from ..pictures.drawing_process import DrawingProcess
@@ -65,7 +65,7 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
     options |= {"engine": arguments.engine, "drawing": drawing}
     for result in run(case, out, fields, picture, **options):
         history = result.history
-        print(
+        say(
             f"{case.name}, uplift {result.case['uplift']}: {verdict(result)}; "
             f"{len(history['time'])} steps, {history['iterations'].sum():.0f} iterations; {out}"
         )
@@ -73,19 +73,19 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
         if reasons := [
             *filter(None, [path_statement(result) if driven else "", statement(result)])
         ]:
-            print(*reasons, sep="\n")
+            say(*reasons)
         if result.last:
-            print(f"\n{summary.text(result, table_width(arguments))}")
+            say(f"\n{summary.text(result, table_width(arguments))}")
         if derived := result.info.get("sensitivity"):
-            print("", derived["statement"] or sensitivity.text(derived["changes"]), sep="\n")
+            say("", derived["statement"] or sensitivity.text(derived["changes"]))
         lines = [*hints(result), result.info.get("error_estimate", {}).get("statement", "")]
         if any(lines):
-            print("", *filter(None, lines), sep="\n")
+            say("", *filter(None, lines))
         if arguments.sensitivity and result.last:
             from ..studies import stiffness
 
             if repeated := stiffness.named_in(arguments.sensitivity):
                 runs = stiffness.repetitions(result.case, result, repeated, arguments.engine)
-                print("", stiffness.meaning(result.case), *stiffness.lines(list(runs)), sep="\n")
+                say("", stiffness.meaning(result.case), *stiffness.lines(list(runs)))
         code = max(code, int(failed(result)))
     return code

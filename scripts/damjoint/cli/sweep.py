@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from .. import InputError
 from .cases import load_case, print_note
-from .options import RESUMED, Checked, Parser, slip, table_width
+from .options import RESUMED, Checked, Parser, say, slip, table_width
 
 if TYPE_CHECKING:
     from ..input.case import Case
@@ -100,11 +100,11 @@ def call(arguments: argparse.Namespace) -> int:
     case = load_case(arguments, arguments.case)
     if case.accuracy:
         case, estimate = meshed(case)
-        print(f"mesh of all rows, refined for the unchanged case: {estimate}")
+        say(f"mesh of all rows, refined for the unchanged case: {estimate}")
     on_note = partial(print_note, case)
     count, rows = sweep(case, plan, out, arguments.jobs, arguments.scheduler, on_note)
-    print(f"{count} rows computed; {out}\n")
-    print(f"{rows_table(plan, rows, table_width(arguments))}\n")
+    say(f"{count} rows computed; {out}\n")
+    say(f"{rows_table(plan, rows, table_width(arguments))}\n")
     loaded = () if plan.sampled else cases_of(case, plan)
     cases = [row_case for _, row_case in loaded]
     report_sweep(case, plan, rows, cases, out)
@@ -119,7 +119,7 @@ def report_sweep(case: Case, plan: Plan, rows: list[Row], cases: list[Case], out
     if plan.sampled:
         from ..studies import outcome
 
-        print(outcome.report(plan, rows, out))
+        say(outcome.report(plan, rows, out))
     picture = beside(out, CHART)
     reason = chart.draw(plan, rows, cases, chart.heading(case, plan, len(rows)), picture)
-    print(reason or picture)
+    say(reason or str(picture))

@@ -30,7 +30,7 @@ from ..model.fields import Solution, along, distance, joint_body, nearest_rows, 
 from ..model.loads import Loading
 from ..model.results import Results
 from ..post import validation
-from ..post.summary import Table, joints_table
+from ..post.summary import Table, joints_note, joints_table
 from ..post.validation import shown_time
 from ..statics import gravity
 from ..statics.statement import statement
@@ -405,7 +405,7 @@ def draw_histories(figure: AnyFigure, result: Results, time: float) -> None:
         return
     left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(1 - BESIDE, BESIDE))[0]
     draw_history(left, panels_of_joints(result), result)
-    draw_table(right, joints_table(result, time))
+    draw_table(right, joints_table(result, time), joints_note(result.case))
 
 
 class Panel(NamedTuple):
@@ -517,14 +517,15 @@ def panels_of_joints(result: Results) -> list[Panel]:
     ]
 
 
-def draw_table(figure: AnyFigure, table: Table) -> None:
-    """Draw a table; its first and last columns to the left."""
-    (axes,) = panels(figure, left=0.05, right=0.1, bottom=0.1, top=0.1).flat
+def draw_table(figure: AnyFigure, table: Table, note: str) -> None:
+    """Draw a table, its first and last columns to the left, and a note below it."""
+    (axes,) = panels(figure, left=0.05, right=0.1, bottom=0.3 if note else 0.1, top=0.1).flat
     axes.set_axis_off()
+    axes.text(0, -0.05, note, fontsize=7, va="top", color=DARK, transform=axes.transAxes)
     heads = [f"{n}\n[{u}]" if u else n for n, u in zip(table.names, table.units, strict=True)]
     columns = zip(table.names, *table.rows, strict=True)
     letters = [max(map(len, column)) + 2 for column in columns]
-    height = size_of(figure)[1] - 0.2
+    height = size_of(figure)[1] - (0.4 if note else 0.2)
     box = (0.0, 0.0, 1.0, min(1.0, (2 + len(table.rows)) * 0.22 / height))
     left = 0, len(heads) - 1
     cells = draw_cells(axes, [heads, *table.rows], letters, box, 7, 0.02, left)

@@ -11,14 +11,24 @@ from matplotlib.figure import Figure
 
 from ..arrays import Array
 from ..model.results import Results
-from .drawing import BLUE, GREY, ORANGE, RED, WATER, figure_of, panels, picture_style, write_picture
+from ..statics.verdict import verdict
+from ..units import unit_of_time
+from .drawing import (
+    BLUE,
+    DARK,
+    GREY,
+    ORANGE,
+    RED,
+    WATER,
+    figure_of,
+    panels,
+    picture_style,
+    write_picture,
+)
+from .run_picture import facts_of
 
 #: Size of the picture [inches].
 SIZE = 9.0, 7.0
-#: Units of its time [s], the largest first.
-UNITS = {"d": 86400.0, "h": 3600.0, "min": 60.0, "s": 1.0}
-#: Least length of the time axis in its unit.
-LEAST = 4.0
 
 
 def has(results: Results) -> bool:
@@ -39,16 +49,17 @@ def figure(results: Results) -> Figure:
     """The figure, of the first joint in which water flows in time."""
     result = next(r for r in results.joints if r.case["uplift"] == "flow")
     case, rows = result.case, result.history
-    length = (rows["time"][-1] - case["time_start"]) * case["time_unit"]
-    unit, size = next((u, s) for u, s in UNITS.items() if length >= LEAST * s or s == 1)
+    unit, factor = unit_of_time((rows["time"][-1] - case["time_start"]) * case["time_unit"])
 
     def in_unit(t: Array) -> Array:
-        return (t - case["time_start"]) * case["time_unit"] / size
+        return (t - case["time_start"]) * case["time_unit"] * factor
 
     picture = figure_of(*SIZE)
-    title = f"{case.title}: water in the joint in time"
+    title = f"{case.title}, water in the joint in time: {verdict(results)}"
     picture.text(0.05, 0.985, title, va="top", fontsize=10, parse_math=False)
-    levels, water, chart = panels(picture, 3, left=0.9, right=1.1, top=0.6, down=0.3)[:, 0]
+    facts = "at the end: " + "\n".join(facts_of(results))
+    picture.text(0.05, 0.955, facts, va="top", fontsize=8, color=DARK, parse_math=False)
+    levels, water, chart = panels(picture, 3, left=0.9, right=1.1, top=0.85, down=0.3)[:, 0]
     shown = rows["time"] >= case["time_start"] - 1e-9
     time = in_unit(rows["time"][shown])
 

@@ -10,9 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import ROUND_OFF
+from ..input.case import Case
+from ..input.values import flows_in_time
 from ..model.results import Results
 from ..statics import gravity
-from ..units import FLUXES, FORCES, LENGTHS, MOMENTS, Units, unit
+from ..statics.verdict import sliding_factor
+from ..units import FLUXES, FORCES, LENGTHS, MOMENTS, Units, unit, unit_of_time
 
 #: Columns of the summary: name in the history, heading, units.
 SHOWN: tuple[tuple[str, str, Units], ...] = (
@@ -53,6 +56,14 @@ class Table(NamedTuple):
             for name, unit in zip(self.names, self.units, strict=True)
         ]
 
+    @property
+    def stacked(self) -> list[str]:
+        """Names in narrow lines, units below them."""
+        return [
+            "\n".join([*wrap(name, 10), *([f"[{unit}]"] if unit else [])])
+            for name, unit in zip(self.names, self.units, strict=True)
+        ]
+
 
 def table_of(columns: Sequence[tuple[str, np.ndarray, Units]], digits: int = 4) -> Table:
     """Format columns (name, values, units) with some digits in units that suit their size; what is
@@ -77,8 +88,14 @@ def levels_table(result: Results, displacements: Units | None = None) -> Table:
     rows = requested_rows(result)
     # a joint that is closed everywhere has its "largest opening" below 0
     history = history | {"max_opening": np.maximum(history["max_opening"], 0)}
+    times: list[tuple[str, np.ndarray, Units]] = []
+    if flows_in_time(case):
+        after = history["time"][rows] - case["time_start"]
+        seconds = np.where(after > -ROUND_OFF, after * case["time_unit"], np.nan)
+        times = [("time", seconds, (unit_of_time(np.nanmax(seconds, initial=0.0)),))]
     names, sizes, cells = table_of(
-        [
+        times
+        + [
             # one unit of forces in all tables
             (head, history[name][rows], units_shown(units, displacements))
             for name, head, units in SHOWN
@@ -111,15 +128,10 @@ OF_JOINTS = (
 
 def joints_table(result: Results, time: float) -> Table:
     """Tabulate the joints at a time, a row each: safety factor against sliding, position of N,
-    lengths that are open, broken, softening, slipped.
+    lengths that are open, broken, softening, slipped; SSF in brackets: see `joints_note`.
     """
     joints = [(joint_result, joint_result.state(time)) for joint_result in result.joints]
-    factors = [
-        gravity.sliding_factor(j.case, state["N"], state["T"], state["bonded_length"])
-        if j.case.law.limits_shear
-        else np.inf
-        for j, state in joints
-    ]
+    factors = [sliding_factor(joint_result, state) for joint_result, state in joints]
     columns: list[tuple[str, np.ndarray, Units]] = [("SSF", np.array(factors), (("", 1.0),))]
     for name, head in OF_JOINTS:
         values = np.array([state[name] for _, state in joints])
@@ -127,8 +139,18 @@ def joints_table(result: Results, time: float) -> Table:
             columns.append((head, values, LENGTHS[:1]))
     table = table_of(columns, 3).beside("joint", result.case.joint_names)
     thirds = (gravity.position(s["x_resultant"], j.case.joint_length) for j, s in joints)
-    rows = [(*row, third) for row, third in zip(table.rows, thirds, strict=True)]
+    graph = result.case.graph
+    rows = [
+        (name, f"({factor})" if graph.is_internal(k) and factor != "-" else factor, *row, third)
+        for k, ((name, factor, *row), third) in enumerate(zip(table.rows, thirds, strict=True))
+    ]
     return Table([*table.names, "N' in"], [*table.units, ""], rows)
+
+
+def joints_note(case: Case) -> str:
+    """What the brackets in `joints_table` mean; empty if there are none."""
+    internal = any(map(case.graph.is_internal, range(len(case.joints))))
+    return "(SSF): between bodies that other joints hold; it is no limit" if internal else ""
 
 
 def differs(broken: np.ndarray, crack: np.ndarray) -> bool:
@@ -157,8 +179,9 @@ def text(result: Results, width: int | None = None) -> str:
         return text_of_joint(result, width)
     last = result.last
     table = joints_table(result, last["time"])
-    heads = [f"{n}\n[{u}]" if u else n for n, u in zip(table.names, table.units, strict=True)]
-    joints = f"joints at level {last['level']:.4g} m:\n{aligned(table.rows, heads, left=1)}"
+    shown = aligned(table.rows, table.stacked, left=1)
+    note = joints_note(case)
+    joints = f"joints at level {last['level']:.4g} m:\n{shown}" + (f"\n{note}" if note else "")
     if width is not None:
         return joints
     tables = zip(case.joint_names, map(text_of_joint, result.joints), strict=True)
@@ -167,13 +190,8 @@ def text(result: Results, width: int | None = None) -> str:
 
 def text_of_joint(result: Results, width: int | None = None) -> str:
     """Format the table of the levels of the only joint of these results."""
-    names, sizes, rows = levels_table(result)
-    wrapped = (wrap(name, 10) for name in names)
-    heads = [
-        "\n".join([*words, f"[{size}]" if size else ""])
-        for words, size in zip(wrapped, sizes, strict=True)
-    ]
-    return fitted(names, heads, rows, LESS, width)
+    table = levels_table(result)
+    return fitted(table.names, table.stacked, table.rows, LESS, width)
 
 
 #: Draws a table of rows and headings.
@@ -214,17 +232,18 @@ def fitted(
 GAP = 2
 
 
-def aligned(rows: list[tuple[str, ...]], heads: list[str], left: int = 0) -> str:
-    """Align rows of cells below headings of several lines; the first `left` columns and the last
-    one to the left, the others to the right. (A package for this takes longer to load than the run
-    to compute.)
+def aligned(rows: list[tuple[str, ...]], heads: list[str], left: int = 0, right: int = 0) -> str:
+    """Align rows of cells below headings of several lines; the first `left` columns, the last one
+    and `right` before it to the left, the others to the right. (A package for this takes longer to
+    load than the run to compute.)
     """
     lines = list(zip_longest(*(head.split("\n") for head in heads), fillvalue=""))
     widths = [
         max(*map(len, head), *map(len, cells))
         for head, cells in zip(zip(*lines, strict=True), zip(*rows, strict=True), strict=True)
     ]
-    sides = [str.ljust] * left + [str.rjust] * (len(widths) - 1 - left) + [str.ljust]
+    numbers = len(widths) - left - right - 1
+    sides = [str.ljust] * left + [str.rjust] * numbers + [str.ljust] * (right + 1)
 
     def line(cells: Sequence[str]) -> str:
         padded = (side(c, w) for side, c, w in zip(sides, cells, widths, strict=True))

@@ -5,6 +5,7 @@ Only this module derives a failure from resultants; statement.py and hints.py sa
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -82,9 +83,9 @@ def failed(results: Results) -> bool:
 
 
 def decisive_joint(results: Results) -> int:
-    """The number of the joint at which the dam fails; of a dam that stands, of the one that is
-    cracked or has slipped over the largest part of its length, but for joints between bodies that
-    other joints hold.
+    """The number of the joint at which the dam fails; of a dam that stands, of the one with the
+    least SSF, or if none has one, that is cracked or has slipped over the largest part of its
+    length; but for joints between bodies that other joints hold.
     """
     if len(results.case.joint_names) == 1:
         return 0
@@ -92,11 +93,24 @@ def decisive_joint(results: Results) -> int:
         return failing[0]
     if not results.last:
         return 0
-    graph, parts = results.case.graph, list[float]()
-    for k, joint_result in enumerate(results.joints):
-        lengths = (joint_result.last[n] for n in ("crack_length", "slip_length"))
-        parts += [-1 if graph.is_internal(k) else max(lengths) / joint_result.case.joint_along]
-    return int(np.argmax(parts))
+
+    def reserve(number: int) -> tuple[bool, float, float]:
+        joint = results.joints[number]
+        damaged = max(joint.last[n] for n in ("crack_length", "slip_length"))
+        internal = results.case.graph.is_internal(number)
+        return internal, sliding_factor(joint, joint.last), -damaged / joint.case.joint_along
+
+    return min(range(len(results.joints)), key=reserve)
+
+
+def sliding_factor(results: Results, state: Mapping[str, float]) -> float:
+    """SSF of the only joint of these results in a row of its history; infinite if its law does not
+    limit shear.
+    """
+    if not results.case.law.limits_shear:
+        return np.inf
+    forces = state["N"], state["T"], state["bonded_length"]
+    return gravity.sliding_factor(results.case, *forces)
 
 
 def failing_joints(results: Results) -> tuple[int, ...]:

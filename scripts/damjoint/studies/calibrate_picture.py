@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from ..input import parameters
 from ..pictures.drawing import BLUE, GREY, RED, figure_of, panels, picture_style, write_picture
+from ..units import with_slash
 from .calibrate import CONFIDENCE, Calibration
 
 #: Sizes [inches]: width, height of a series.
@@ -51,7 +52,7 @@ def figure(answer: Calibration) -> Figure:
 def estimate_words(answer: Calibration, number: int) -> str:
     """An estimate with its interval."""
     one, (low, high) = answer.free[number], answer.intervals[number]
-    unit = parameters.parameter(one.name).unit
+    unit = with_slash(parameters.parameter(one.name).unit)
     text = f"{one.name} = {answer.estimates[number]:.4g} {unit} ({low:.4g} to {high:.4g})"
     return text + (", not determined" if one.name in answer.undetermined else "")
 
@@ -66,6 +67,7 @@ def draw_series(axes: Axes, answer: Calibration, number: int) -> None:
     label = "measured, 2 standard deviations"
     axes.errorbar(times[read], factor * one.measured[read], bars, label=label, **style)  # type: ignore[arg-type]
     axes.plot(times, factor * answer.computed[number], color=BLUE, linewidth=1.0, label="computed")
+    axes.locator_params(axis="x", integer=True)
     axes.set_ylabel(f"{one.name} [{unit}]", fontsize=8)
     axes.grid(alpha=0.3)
     if number == 0:

@@ -18,6 +18,7 @@ from ..post.tables import Column, write_csv
 from ..session import Session, preparation, session
 from ..solver.load_stepper import LoadStepper
 from ..storage import atomic_write
+from ..units import with_slash
 from .calibrate import CONFIDENCE, Calibration, Fit, Free
 from .calibrate_picture import draw
 from .measurements import Measurements
@@ -25,7 +26,7 @@ from .measurements import Measurements
 #: Files: estimates; measured and computed values.
 ESTIMATES, RESIDUALS = "calibration.csv", "residuals.csv"
 #: Headings of the printed estimates.
-HEADS = ["parameter", "unit", "start", "estimate", f"{CONFIDENCE:.0%} interval", "", ""]
+HEADS = ["parameter", "unit", "start", "estimate", f"{CONFIDENCE:.0%} interval"]
 
 
 def calibrate(
@@ -180,12 +181,10 @@ def estimates_text(answer: Calibration) -> str:
     rows: list[tuple[str, ...]] = [
         (
             one.name,
-            parameters.parameter(one.name).unit,
+            with_slash(parameters.parameter(one.name).unit),
             f"{one.start:.4g}",
             f"{estimate:.4g}",
-            f"{low:.4g}",
-            "to",
-            f"{high:.4g}",
+            f"{low:.4g} to {high:.4g}",
         )
         for one, estimate, (low, high) in zip(
             answer.free, answer.estimates, answer.intervals, strict=True

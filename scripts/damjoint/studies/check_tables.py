@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
-from tabulate import tabulate
 
 from ..pictures.check_picture import SIGN
-from ..post.summary import fitted
+from ..post.summary import aligned, fitted
 from ..units import FORCES, MOMENTS, STRESSES, Units, unit
 from .check import (
     DIFFERENCE,
@@ -61,16 +61,16 @@ def text_table(checks: list[SafetyCheck], width: int | None = None) -> str:
         columns += [list(map(cell, line * factor, is_difference)) for line in values]
     verdicts = ([row[name] for row in rows] for name in ("position", "verdict"))
     scenes = [scene_label(checks, row) for row in rows]
-    partial = (", partial load" * (row.get("load") == "partial") for row in rows)
-    methods = [row["answer"] + part for row, part in zip(rows, partial, strict=True)]
-    columns = [scenes, methods, *columns, *verdicts]
-    heads = ["case", "method", *heads, "N' in", "check"]
-
-    def draw(rows: list[tuple[str, ...]], heads: list[str]) -> str:
-        sides = ["left", "left", *("right" for _ in heads[4:]), "left", "left"]
-        return str(tabulate(rows, heads, disable_numparse=True, colalign=sides))
-
+    loads = (", partial load" * (row.get("load") == "partial") for row in rows)
+    methods = [row["answer"] + part for row, part in zip(rows, loads, strict=True)]
+    first, common = "case", f"{checks[0].case.name}, " if checks else ""
+    if all(scene.startswith(common) for scene in scenes):  # only joints or uplifts differ
+        first = "joint" if len({row["joint"] for row in rows}) > 1 else "uplift"
+    of_case = common if first != "case" else ""
+    columns = [[scene.removeprefix(of_case) for scene in scenes], methods, *columns, *verdicts]
+    heads = [first, "method", *heads, "N' in", "check"]
     cells = list(zip(*columns, strict=True))
+    draw = partial(aligned, left=2, right=1)
     table = fitted([*names, "N' in", "check"], heads, cells, LESS, width, draw)
     lines = [
         f"{scene}, {row['answer']}: {'fails, ' * (row['verdict'] == FAIL)}{row['why']}"

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
-
-from tabulate import tabulate
 
 from ..arrays import Array
 from ..arrays import Table as Columns
@@ -15,7 +15,7 @@ from ..input.case import Case
 from ..mesh.mesh import Mesh
 from ..model.fields import Field
 from ..model.results import QUAKE, QUAKE_OF_JOINTS, Results, column_of, quake_columns
-from ..post.summary import Table
+from ..post.summary import Table, aligned, fitted
 from ..statics.notes import remarks
 from . import quake_summary
 
@@ -213,14 +213,24 @@ def damping_of(summary: dict[str, Any]) -> str:
     return f"Rayleigh damping set to {100 * ratio:.3g} % at {first:.3g} and {second:.3g} Hz: {acts}"
 
 
-#: Width of a printed table beside its first column.
-NUMBERS = 40
+#: Columns of the table of the joints that a narrow table leaves out, in this order.
+LESS = "broken", "open", "residual tilt", "toe"
 
 
 def text(case: Case, summary: dict[str, Any], width: int | None = None) -> str:
-    """Notes, peaks and residual values of a summary as printed tables; width: of the terminal."""
-    tables = peaks_table(summary, case), residual_table(summary, case)
-    options = {} if width is None else {"maxcolwidths": [max(width - NUMBERS, 20)]}
-    parts = [tabulate(t.rows, t.heads, disable_numparse=True, **options) for t in tables]
+    """Notes, peaks and residual values of a summary as printed tables, of several joints a row for
+    each; width: of the terminal, None: all columns.
+    """
+    peaks = peaks_table(summary, case, of_joints=not case.of_joints)
+    # the first words of a meaning: an explanation may follow
+    short = [(re.split("[:,(]", name)[0].strip(), *cells) for name, *cells in peaks.rows]
+    parts = [aligned(short, peaks.stacked, left=2)]
+    if case.of_joints:
+        joints = joints_table(summary, case)
+        draw = partial(aligned, left=1)
+        parts.append(fitted(joints.names, joints.stacked, joints.rows, LESS, width, draw))
+    else:
+        rest = residual_table(summary, case)
+        parts.append(aligned(rest.rows, rest.heads, left=2))
     lines = [*(f"note: {note}" for note in summary["notes"]), modes(summary)]
     return "\n\n".join(["\n".join(lines), *parts])

@@ -17,6 +17,7 @@ from ..processes import check_jobs
 from ..progress import Progress
 from ..session import session
 from ..storage import atomic_write
+from ..units import with_slash
 from . import sampling
 from .reliability import (
     CriticalLevels,
@@ -181,4 +182,4 @@ def printed_lines(levels: CriticalLevels, results: Sequence[Reliability], out: P
 
 def unit_of(name: str) -> str:
     """Unit of a variable."""
-    return "m" if name == "level" else parameter(name.rpartition(".")[2]).unit
+    return "m" if name == "level" else with_slash(parameter(name.rpartition(".")[2]).unit)

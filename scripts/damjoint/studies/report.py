@@ -24,7 +24,7 @@ from ..model.results import Results
 from ..pictures import run_picture
 from ..pictures.drawing import figure_of, picture_style
 from ..post import stored
-from ..post.summary import Table, joints_table, levels_table, table_of
+from ..post.summary import Table, joints_note, joints_table, levels_table, table_of
 from ..post.validation import shown_time
 from ..statics.gravity import GravityMethod
 from ..statics.rigid_block import force, resultant_of
@@ -111,6 +111,8 @@ class RunSection:
     joints: list[JointSection]
     #: several joints at the last level; else None
     of_joints: Table | None
+    #: on that table; may be empty
+    joints_note: str
     #: of `damjoint quake`; else None
     earthquake: report_quake.Earthquake | None
     #: by their headings: flow in time, calibration, if they were drawn
@@ -329,6 +331,7 @@ def run_section(folder: Path, number: int, solution: Solution) -> RunSection:
         of_joints=joints_table(result, result.last["time"])
         if case.of_joints and result.last
         else None,
+        joints_note=joints_note(case),
         earthquake=report_quake.read(folder, case, info),
         further=further_pictures(folder, result),
         level=f"{last['level']:.4g} m" if last else "",

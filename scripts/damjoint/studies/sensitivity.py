@@ -8,18 +8,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from tabulate import tabulate
 
 from .. import InputError, RunError
 from ..arrays import Value
 from ..input.case import Case
 from ..input.parameters import declared, parameter
 from ..model.results import Results, with_all_joints
+from ..post.summary import aligned
 from ..post.tables import write_csv
 from ..solver.derivatives import NOT_CONTINUOUS, Differentiation, half_difference
 from ..solver.load_stepper import LoadStepper
 from ..solver.path import Point
 from ..threads import limited_threads
+from ..units import with_slash
 
 #: The file of the derivatives of a run.
 FILE = "sensitivity.csv"
@@ -192,7 +193,8 @@ def changes(
         row = last[k]
         if not sizes[k].any():
             continue
-        cells: dict[str, Value] = {"parameter": row.name, "value": row.value, "unit": row.unit}
+        unit = with_slash(row.unit)
+        cells: dict[str, Value] = {"parameter": row.name, "unit": unit, "value": row.value}
         cells |= dict(zip(heads, sizes[k].tolist(), strict=True))
         listed.append(cells | {"at a kink": "yes" if row.kink else ""})
     return listed
@@ -200,8 +202,10 @@ def changes(
 
 def text(listed: Sequence[Mapping[str, Value]]) -> str:
     """Changes as a printed table."""
-    cells = [
-        {n: f"{v:.4g}" if isinstance(v, float) else v for n, v in row.items()} for row in listed
+    rows = [
+        tuple(f"{v:.4g}" if isinstance(v, float) else str(v) for v in row.values())
+        for row in listed
     ]
     title = "Change by one percent more of a parameter (by its unit, if it is 0)"
-    return f"{title}\n{tabulate(cells, 'keys', disable_numparse=True)}"
+    heads = [name.replace(" [", "\n[").replace("at a ", "at a\n") for name in listed[0]]
+    return f"{title}\n{aligned(rows, heads, left=2)}"
