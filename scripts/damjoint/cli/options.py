@@ -220,8 +220,6 @@ def say(*texts: str, end: str = "\n", file: TextIO | None = None) -> None:
     stream, lines = file or sys.stdout, "\n".join(texts).split("\n")
     if stream.isatty():
         width = shutil.get_terminal_size().columns
-        whole = {"break_long_words": False, "break_on_hyphens": False}
-        lines = [
-            line if "  " in line.strip() else textwrap.fill(line, width, **whole) for line in lines
-        ]
+        wrapper = textwrap.TextWrapper(width, break_long_words=False, break_on_hyphens=False)
+        lines = [line if "  " in line.strip() else wrapper.fill(line) for line in lines]
     print("\n".join(lines), end=end, file=stream)
