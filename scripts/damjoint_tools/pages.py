@@ -129,7 +129,8 @@ def results_page() -> str:
         steps,
         "## curve.csv",
         "Written by a run under displacement control: `time`, `level` [m], `pressure` [Pa] at the "
-        "foot of the face, `heel_opening` [m], `crest_ux` [m] of each converged step.",
+        "foot of the face, `heel_opening` [m], `crest_ux` [m] of each converged step; with "
+        "`drive_load` also `load_factor` [-], with `drive = point` also `point_u` [m].",
         "## check.csv",
         "Written by `damjoint check`: for each joint of a scene a row by the finite elements, a "
         "row by the gravity method, and, where both have the same load, a row with their "

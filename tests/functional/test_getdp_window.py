@@ -72,7 +72,7 @@ def press_run(folder, changed):
             "joint_slope 60 -setnumber dam_base 6",
             "joint_slope = 60: must let the joint leave the dam below its crest",
         ),
-        ("force_x 1 -setnumber force_at 3", "force_at, anchor_at: must lie on the dam's faces"),
+        ("force_x 1 -setnumber force_at 3", "anchor_at, drive_at: must lie on the dam's faces"),
     ],
 )
 def test_impossible_sections_are_refused_before_the_run(project, words, message):

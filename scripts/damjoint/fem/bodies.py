@@ -12,7 +12,7 @@ from .. import ROUND_OFF
 from ..arrays import Array, IntArray, distinct, others
 from ..csr import CsrMatrix
 from ..input.case import Case
-from ..input.scene import LINES, MATERIALS
+from ..input.scene import LINES, MATERIALS, POINT, TRACTION
 from ..mesh.body import Body
 from ..mesh.mesh import Mesh, mesh_of
 from ..model.loads import COMPLETE, across, thermal_strains, wet
@@ -43,7 +43,7 @@ class ElasticBody:
     #: (n, n) [N/m]
     stiffness: CsrMatrix
     #: load vectors (n,) by name: weight densities dam_x, dam_y, lower_x, ... [N/m3], forces per
-    #: metre of a line ice_x, ice_y, ... [N/m], thermal strains dam_uniform, ... [-]
+    #: metre of a line ice_x, ice_y, ... [N/m], tractions [Pa], thermal strains dam_uniform, ... [-]
     unit_loads: dict[str, Array]
     #: thermal strains of those of unit_loads at the middle of each element (elements,)
     unit_strains: dict[str, Array]
@@ -107,7 +107,7 @@ def unit_loads(space: Space, mesh: Mesh, name: str) -> Iterator[tuple[str, Array
     for region, component in WEIGHTS:
         if region in space.body.regions:
             yield f"{region}_{'xyz'[component]}", body_force(space, dim, component, region)
-    for line in LINES:
+    for line in (*LINES, TRACTION):
         if line in mesh.bodies and mesh.bearer(line) == name:
             part = Space(mesh.bodies[line], space.order)
             points = points_of(part, WATER)
@@ -177,6 +177,22 @@ class Bodies:
         name, mesh = self.mesh.bearer("crest"), self.mesh
         functions = self.by_name[name].space.find(Space(mesh.bodies["crest"], 1))
         return name, int(functions[0]) * mesh.dim
+
+    @property
+    def measures(self) -> dict[str, tuple[str, Array]]:
+        """Displacements that may be prescribed or printed, each a body and what they are of its
+        degrees of freedom (n,): crest, along x; point_x, point_y, those that the unit forces on the
+        controlled point do work on, in 3D means over its line.
+        """
+        body, crest = self.crest
+        row = np.zeros(self.by_name[body].stiffness.shape[0])
+        row[crest] = 1.0
+        measures = {"crest": (body, row)}
+        if POINT in self.mesh.bodies:
+            bearer, width = self.mesh.bearer(POINT), self.mesh.joints[0].width
+            loads = self.by_name[bearer].unit_loads
+            measures |= {n: (bearer, loads[n] / width) for n in (f"{POINT}_x", f"{POINT}_y")}
+        return measures
 
     @property
     def without_supports(self) -> Bodies:

@@ -30,6 +30,7 @@ from ..model.loads import COMPLETE, overtopped, thermal_strains, wet_segments
 from ..storage import cache_folder, read_entry, write_entry
 from .condensed import Condensed, CondensedJoint, JointDofs
 from .memory import check_size, iterates
+from .responses import Measure
 
 if TYPE_CHECKING:
     from .bodies import Bodies
@@ -147,7 +148,8 @@ def write(condensed: Condensed, header: str, path: Path) -> None:
 
 #: The dataclasses of which condensed bodies are made.
 CLASSES = {
-    cls.__name__: cls for cls in (Condensed, CondensedJoint, JointDofs, JointMesh, Face, Body)
+    cls.__name__: cls
+    for cls in (Condensed, CondensedJoint, JointDofs, Measure, JointMesh, Face, Body)
 }
 
 

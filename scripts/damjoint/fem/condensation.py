@@ -36,7 +36,7 @@ from . import factor
 from .bodies import Bodies, ElasticBody
 from .condensed import Condensed, CondensedJoint
 from .gluing import BodyDofs, Gluing
-from .responses import Responses
+from .responses import Measure, Responses
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,57 +166,70 @@ def responses_body_by_body(bodies: Bodies, gluing: Gluing) -> Responses:
     """Eliminate each body, then the displacements of the glued ones on the joints, dense: fastest
     where the joints have few unknowns.
     """
-    crest_body, crest = bodies.crest
     loaded = {name: bodies.loaded_dofs(name) for name in bodies.by_name}
-    loaded[crest_body] = np.append(loaded[crest_body], crest)
+    for bearer, row in bodies.measures.values():
+        loaded[bearer] = np.append(loaded[bearer], np.flatnonzero(row))
     reduced = {
         name: ReducedBody.of(body, gluing.bodies[name].dofs, loaded[name])
         for name, body in bodies.by_name.items()
     }
     joints = JointElimination(gluing, reduced)
 
-    # The crest of body c: row (forces - coupling^T u_c), unless it is on a joint itself;
-    # u_c = R_c v + J_c d with v = K^-1 (sum R_b^T f_b - C d)
-    above, own_dofs = reduced[crest_body], gluing.bodies[crest_body]
-    size = len(above.loaded_stiffness)
-    at_crest = 1.0 * (above.dofs[:size] == crest)
-    row = solve_positive(above.loaded_stiffness, at_crest)
-    crest_face = 1.0 * (own_dofs.dofs == crest) - above.coupling @ row
-    crest_nodes = joints.on_nodes(own_dofs, crest_face)
-    crest_both = solve_positive(joints.glued, crest_nodes)
-
     pressure: list[Array] = []
-    crest_pressure: list[Array] = []
     units: dict[str, Array] = {}
-    crest_units: dict[str, float] = {}
     dof_of_face: dict[str, IntArray] = {}
     count = 0
     for name, body in bodies.by_name.items():
         part, of_body = reduced[name], gluing.bodies[name]
-        bears_crest = name == crest_body
         pressure.append(joints.transmitted(of_body, part.forces))
-        direct = np.pad(row, (0, len(part.dofs) - size)) if bears_crest else 0
-        crest_pressure.append(direct + crest_both[of_body.node] @ part.forces)
         column = np.full(body.stiffness.shape[0], -1)
         column[part.dofs] = count + np.arange(len(part.dofs))
         count += len(part.dofs)
         dof_of_face |= {n: column[dofs] for n, dofs in body.face_dofs.items()}
         by_load = joints.transmitted(of_body, part.units)
-        moved = (row @ part.loaded_units if bears_crest else 0) + (
-            crest_both[of_body.node] @ part.units
-        )
         for i, load in enumerate(body.unit_loads):
             units[load] = units.get(load, 0) + by_load[:, i]
-            crest_units[load] = crest_units.get(load, 0) + float(moved[i])
 
     return Responses(
         stiffness=joints.stiffness,
         units=units,
         pressure=np.hstack(pressure),
         dof_of_face=dof_of_face,
-        crest_jump=own_dofs.on_jumps(crest_face) - joints.coupling @ crest_both,
-        crest_units=crest_units,
-        crest_pressure=np.concatenate(crest_pressure),
+        measures={
+            name: measured(bodies, reduced, joints, *measure)
+            for name, measure in bodies.measures.items()
+        },
+    )
+
+
+def measured(
+    bodies: Bodies,
+    reduced: dict[str, ReducedBody],
+    joints: JointElimination,
+    bearer: str,
+    weights: Array,
+) -> Measure:
+    """A displacement of body c, weights of its degrees of freedom (n,): on those away from the
+    joints row (forces - coupling^T u_c); u_c = R_c v + J_c d with v = K^-1 (sum R_b^T f_b - C d).
+    """
+    above, own_dofs = reduced[bearer], joints.gluing.bodies[bearer]
+    size = len(above.loaded_stiffness)
+    row = solve_positive(above.loaded_stiffness, weights[above.dofs[:size]])
+    on_face = weights[own_dofs.dofs] - above.coupling @ row
+    both = solve_positive(joints.glued, joints.on_nodes(own_dofs, on_face))
+    pressure: list[Array] = []
+    units: dict[str, float] = {}
+    for name, body in bodies.by_name.items():
+        part, node = reduced[name], joints.gluing.bodies[name].node
+        direct = np.pad(row, (0, len(part.dofs) - size)) if name == bearer else 0
+        pressure.append(direct + both[node] @ part.forces)
+        moved = (row @ part.loaded_units if name == bearer else 0) + both[node] @ part.units
+        for i, load in enumerate(body.unit_loads):
+            units[load] = units.get(load, 0) + float(moved[i])
+    return Measure(
+        jump=own_dofs.on_jumps(on_face) - joints.coupling @ both,
+        units=units,
+        pressure=np.concatenate(pressure),
     )
 
 

@@ -4,7 +4,7 @@ have too many unknowns for dense matrices of each body.
 Unknowns w = (v, d): displacements v of the glued bodies, jumps d. A body moves by u_b = T_b w, so
 that A = sum T_b^T K_b T_b; its Schur complement on d is S. Unit loads F, a border of A, give the
 rest at the same time: t_0 = F_d - A_dv A_vv^-1 F_v, and F_v^T A_vv^-1 F_v, of which the row of a
-unit force on the crest has the displacements of the crest.
+unit force, as on the crest, has the displacement that it does work on.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .bodies import Bodies
 from .factor import bordered, dense_schur
 from .glued_bodies import GluedBodies
 from .gluing import Gluing
-from .responses import Responses
+from .responses import Measure, Responses
 
 
 def responses_at_once(bodies: Bodies, gluing: Gluing) -> Responses:
@@ -37,21 +37,29 @@ def responses_at_once(bodies: Bodies, gluing: Gluing) -> Responses:
         count += len(dofs)
         loaded.append(motion[name][dofs])
         dof_of_face |= {face: column[of_face] for face, of_face in body.face_dofs.items()}
-    crest_body, crest = bodies.crest
-    rows: list[Sparse] = [*loaded, *unit_loads.values(), motion[crest_body][crest]]
+    measures = {
+        name: sparse.csr_matrix(motion[body].T @ row)
+        for name, (body, row) in bodies.measures.items()
+    }
+    rows: list[Sparse] = [*loaded, *unit_loads.values(), *measures.values()]
     loads = sparse.vstack(rows, format="csr").T
     stiffness = sum(m.T @ bodies.by_name[name].stiffness.scipy() @ m for name, m in motion.items())
     matrix = bordered(stiffness, loads)
     del stiffness
     schur = dense_schur(matrix, np.arange(len(glued.free), matrix.shape[0]))
-    number = gluing.unknowns
-    t_0, moved = schur[number:, :number], -schur[-1, number:]
+    number, last = gluing.unknowns, count + len(unit_loads)
+    t_0, moved = schur[number:, :number], -schur[number + last :, number:]
     return Responses(
         stiffness=schur[:number, :number].copy(),
-        units={n: row.copy() for n, row in zip(unit_loads, t_0[count:-1], strict=True)},
+        units={n: row.copy() for n, row in zip(unit_loads, t_0[count:last], strict=True)},
         pressure=schur[:number, number : number + count].copy(),
         dof_of_face=dof_of_face,
-        crest_jump=t_0[-1].copy(),
-        crest_units=dict(zip(unit_loads, moved[count:-1].tolist(), strict=True)),
-        crest_pressure=moved[:count],
+        measures={
+            name: Measure(
+                jump=t_0[last + k].copy(),
+                units=dict(zip(unit_loads, moved[k, count:last].tolist(), strict=True)),
+                pressure=moved[k, :count].copy(),
+            )
+            for k, name in enumerate(measures)
+        },
     )

@@ -9,6 +9,15 @@ from ..csr import CsrMatrix
 
 
 @dataclass(frozen=True, kw_only=True)
+class Measure:
+    """A displacement of the bodies [m]: per jump (j,), by unit loads, by unit forces (m,)."""
+
+    jump: Array
+    units: dict[str, float]
+    pressure: Array
+
+
+@dataclass(frozen=True, kw_only=True)
 class Responses:
     """Of bodies condensed onto j free jump unknowns, with m forces on wet faces."""
 
@@ -20,10 +29,8 @@ class Responses:
     #: freedom of a face (functions * dim,); -1: none, it is fixed or never loaded
     pressure: Array | CsrMatrix
     dof_of_face: dict[str, IntArray]
-    #: displacement of the crest along x: per jump (j,), by unit loads, by unit forces (m,)
-    crest_jump: Array
-    crest_units: dict[str, float]
-    crest_pressure: Array
+    #: displacements by name, see `Bodies.measures`
+    measures: dict[str, Measure]
 
     @property
     def size(self) -> int:

@@ -22,6 +22,7 @@ from ..mesh.joint_mesh import JointMesh
 from .bodies import Bodies, ElasticBody
 from .condensed import Condensed, CondensedJoint, JointDofs
 from .memory import PER_UNKNOWN_ITERATED, check_memory
+from .responses import Measure
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,9 +139,13 @@ def uncondensed(case: Case, bodies: Bodies) -> Uncondensed:
         for face, dofs in body.face_dofs.items()
     }
     spread = np.ones(len(loaded)), numbering.unknown[loaded], np.arange(len(loaded))
-    crest_body, crest = bodies.crest
-    at_crest, units = np.zeros(count), numbering.unit_loads()
-    at_crest[numbering.unknown[numbering.first[crest_body] + crest]] = 1.0
+    units, measures = numbering.unit_loads(), dict[str, Measure]()
+    for measure, (body, weights) in bodies.measures.items():
+        row, unknown = np.zeros(count), numbering.unknown[numbering.of_body(body)]
+        row[unknown[unknown >= 0]] = weights[unknown >= 0]
+        measures[measure] = Measure(
+            jump=row, units=dict.fromkeys(units, 0.0), pressure=np.zeros(len(loaded))
+        )
     stiffness = [body.free_stiffness.scipy() for body in by_name.values()]
     rigid = np.concatenate([rigid_motions(body) for body in by_name.values()])
     return Uncondensed(
@@ -148,9 +153,7 @@ def uncondensed(case: Case, bodies: Bodies) -> Uncondensed:
         units=units,
         pressure=CsrMatrix.of_entries(*spread, (count, len(loaded))),
         dof_of_face=dof_of_face,
-        crest_jump=at_crest,
-        crest_units=dict.fromkeys(units, 0.0),
-        crest_pressure=np.zeros(len(loaded)),
+        measures=measures,
         dim=mesh.dim,
         order=int(case["order"]),
         width=mesh.joints[0].width,

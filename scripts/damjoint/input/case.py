@@ -28,7 +28,7 @@ from .constraints import (
 from .joint_graph import ROCK, JointGraph
 from .parameters import GEOMETRY_LISTS, constants, declared, independent
 from .source import Source
-from .values import ParameterValues, listed
+from .values import ParameterValues, level_unknown, listed
 from .values import flows as flows
 from .values import freezes_uplift as freezes_uplift
 from .values import has_drains as has_drains
@@ -282,12 +282,12 @@ class Case(ParameterValues):
     @property
     def reached(self) -> float:
         """The highest level of the reservoir [m]; the highest allowed if it is not prescribed."""
-        return max(self.levels) if self["drive"] == "level" else self.highest_level
+        return self.highest_level if level_unknown(self) else max(self.levels)
 
     @property
     def has_water(self) -> bool:
         """Whether water stands on either side of the dam at some time."""
-        return self["drive"] != "level" or max(*self.levels, *self.tail_levels) > 0
+        return level_unknown(self) or max(*self.levels, *self.tail_levels) > 0
 
     def level_at(self, time: float) -> float:
         """Reservoir level [m] at a time, linear between the levels, from 0 at t = 0."""

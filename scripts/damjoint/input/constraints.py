@@ -15,7 +15,7 @@ import numpy as np
 from .. import InputError
 from ..laws import LAWS
 from .parameters import constants, declared
-from .values import ParameterValues, flows, flows_in_time, has_drains
+from .values import ParameterValues, flows, flows_in_time, has_drains, level_unknown
 
 #: Usual values, from and to, in SI units: a density of 24 kN/m3 or a strength of 0.2 MPa without
 #: its unit is none.
@@ -42,6 +42,7 @@ LARGEST = {
     **dict.fromkeys(("temperature_dam", "temperature_linear", "temperature_found"), 1e4),
     **dict.fromkeys(("expansion_dam", "expansion_found"), 1e-2),
     **dict.fromkeys(("k_h", "k_v"), 1e2),
+    **dict.fromkeys(("traction_x", "traction_y"), 1e10),
 }
 #: Length over the dam's height below which the mesh generator takes two points for one.
 LEAST_LENGTH = 1e-6
@@ -70,6 +71,7 @@ STAGED = {
     "anchor": ("anchor_force",),
     "quake": ("k_h", "k_v"),
     "temperature": ("temperature_dam", "temperature_linear", "temperature_found"),
+    "traction": ("traction_x", "traction_y"),
 }
 WORKS = {"grout": ("grout_pressure",), "saw": ("saw_thickness",)}
 
@@ -242,8 +244,10 @@ def check_section(case: ParameterValues, section: Mapping[str, Sequence[float]])
         ("force_x", "force_at", "FORCE", f"the {case['force_face']} face"),
         ("force_y", "force_at", "FORCE", f"the {case['force_face']} face"),
         ("anchor_force", "anchor_at", "ANCHOR", "the crest"),
+        ("drive", "drive_at", "POINT", f"the {case['drive_face']} face"),
     ):
-        if case[force] and regions[region][0] not in marks:
+        acts = case["drive"] == "point" if force == "drive" else case[force]
+        if acts and regions[region][0] not in marks:
             raise InputError(f"{name} = {case[name]:g}: must lie on {face} of the dam")
     simple = not (batter or case["neck_height"] or case["joint_height"] or marks)
     if case["mesh_pattern"] == "regular" and not simple:
@@ -365,7 +369,7 @@ def check_distances(case: ParameterValues, length: float) -> None:
 def check_drains(case: ParameterValues) -> None:
     """Drains: with a prescribed displacement their pressure has to be linear in the level."""
     level, drive = case["drain_level"], case["drive"]
-    if has_drains(case) and not flows(case) and drive != "level" and level > 0:
+    if has_drains(case) and not flows(case) and level_unknown(case) and level > 0:
         raise InputError(
             f"drain_level = {level:g}: must be 0 with drive = {drive} "
             "(the pressure has to be linear in the level)"
@@ -478,8 +482,20 @@ def check_times(times: Sequence[float], last: int) -> None:
         )
 
 
-def check_drive(begin: float, end: float, last: int) -> None:
-    """Times between which a displacement is prescribed."""
+def check_drive(case: ParameterValues, last: int) -> None:
+    """Times between which a displacement is prescribed; the load whose factor is unknown acts, and
+    its factor is unknown to the end.
+    """
+    begin, end, load = case["drive_begin"], case["drive_end"], case["drive_load"]
+    if load != "level":
+        sizes = STAGED[load]
+        if not any(case[name] for name in sizes):
+            raise InputError(
+                f"drive_load = {load}: must be level, or {' or '.join(sizes)} not 0 (the load "
+                "whose factor is unknown)"
+            )
+        if end != last:
+            raise InputError(f"drive_end = {end:g}: must be {last} (the last t) with drive_load")
     if not 0 <= begin < end <= last:
         raise InputError(
             f"drive_begin, drive_end = {begin:g}, {end:g}: must be "

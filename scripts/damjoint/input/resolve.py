@@ -188,7 +188,7 @@ def check_loading(case: Case, tails: Sequence[float], of_case: bool) -> None:
     check_times(case.times, number)
     check_also_uplift(case.also_uplift, case["uplift"])
     if case["drive"] != "level":
-        check_drive(case["drive_begin"], case["drive_end"], number)
+        check_drive(case, number)
 
 
 def with_drive_times(case: Case) -> Case:

@@ -42,5 +42,7 @@ SIDES = UP, DOWN, TOP, FLOOR, BED = "up", "down", "top", "floor", "bed"
 #: Sides on which tailwater presses, not the reservoir.
 TAILWATER = DOWN, BED
 
-#: Regions of line forces.
-LINES = ("ice", "force", "anchor")
+#: Regions of line forces; the last: where a displacement is prescribed, by its unit force.
+LINES = *_, POINT = "ice", "force", "anchor", "point"
+#: Region of a face under a traction.
+TRACTION = "traction"

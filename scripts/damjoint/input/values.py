@@ -13,6 +13,9 @@ TextName: TypeAlias = Literal[
     "uplift",
     "face_load",
     "drive",
+    "drive_load",
+    "drive_direction",
+    "drive_face",
     "mesh_pattern",
     "quadrature",
     "force_face",
@@ -85,6 +88,11 @@ def listed(values: Values) -> str:
         f"{name} = {value if isinstance(value, str) else format(value, 'g')}"
         for name, value in values.items()
     )
+
+
+def level_unknown(values: Values | ParameterValues) -> bool:
+    """Whether the reservoir's level is unknown, and a displacement prescribed."""
+    return values["drive"] != "level" and values["drive_load"] == "level"
 
 
 def flows(values: Values | ParameterValues) -> bool:

@@ -11,7 +11,15 @@ import numpy as np
 from ..arrays import Array
 from ..input.case import Case
 from ..input.scene import BED, DOWN
-from ..model.loads import AddedPressure, Loading, line_forces, thermal_strains, water_column
+from ..model.loads import (
+    LEVEL,
+    AddedPressure,
+    Loading,
+    Unknown,
+    line_forces,
+    thermal_strains,
+    water_column,
+)
 from .flow_in_time import TimeStep
 from .interface import Interface
 from .joint_laws import JointLaws, JointVariables
@@ -178,17 +186,23 @@ class Equilibrium:
             water=self.water_in_step(variables, before_quake, steps),
         )
 
-    # -- the crest
+    # -- displacements of the bodies
 
-    def crest(self, jump: Array, loading: Loading) -> float:
-        """The crest's displacement along x [m]."""
-        bulk = self.bulk
-        value = bulk.crest_pressure @ self.external_forces(loading)[0] + bulk.crest_jump @ jump
-        for name, size in self.sizes(loading.grown).items():
-            value += size * bulk.crest_units[name]
+    def displacement(self, name: str, jump: Array, loading: Loading) -> float:
+        """A displacement by its name among `Bodies.measures` [m]."""
+        measure = self.bulk.measures[name]
+        value = measure.pressure @ self.external_forces(loading)[0] + measure.jump @ jump
+        for load, size in self.sizes(loading.grown).items():
+            value += size * measure.units[load]
         return float(value)
 
-    def crest_rate(self, loading: Loading) -> float:
-        """Its derivative with the level."""
-        forces = rate(lambda other: self.external_forces(other)[0], loading, self.case.size)
-        return float(self.bulk.crest_pressure @ forces)
+    def displacement_rate(self, name: str, loading: Loading, unknown: Unknown) -> float:
+        """Its derivative with what is unknown in the loading."""
+        measure, size = self.bulk.measures[name], self.case.size
+        forces = rate(lambda other: self.external_forces(other)[0], loading, size, unknown)
+        total = measure.pressure @ forces
+        if unknown != LEVEL:
+            more = unknown.at(loading, unknown.of(loading) + 1)
+            for sign, sizes in ((1, self.sizes(more.grown)), (-1, self.sizes(loading.grown))):
+                total += sign * sum(size * measure.units[load] for load, size in sizes.items())
+        return float(total)

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..arrays import Array, BoolArray
 from ..csr import CsrMatrix
-from ..model.loads import Loading
+from ..model.loads import LEVEL, Loading, Unknown
 from .interface import Interface
 from .joint_laws import JointLaws, JointVariables
 from .linear_system import LinearSystem, Tangent
@@ -60,8 +60,8 @@ class Residual:
     value: Array
     #: with the jump, by the law's tangent or by its secant (True)
     by_jump: Callable[[bool], Tangent]
-    #: with the level (j,)
-    by_level: Callable[[], Array]
+    #: with the level, or with what else is unknown (j,)
+    by_unknown: Callable[[Unknown], Array]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,28 +130,32 @@ class JointProblem:
             law = sum(beside, law)
             return flow.tangent(law) if flow else Tangent(law)
 
-        def by_level() -> Array:
+        def by_unknown(unknown: Unknown) -> Array:
             slope = np.zeros(len(jump))
             if self.loads:
-                slope = -rate(self.loads, loading, self.size)
+                slope = -rate(self.loads, loading, self.size, unknown)
             if water and flow:
                 lift = lambda other: water.flow(jump, other).lift
-                slope = slope - rate(lift, loading, self.size)
+                slope = slope - rate(lift, loading, self.size, unknown)
             if water and loses:
                 lost = lambda other: interface.forces(water.lost_pressure(at_points, other)[0])
-                slope = slope + rate(lost, loading, self.size)
+                slope = slope + rate(lost, loading, self.size, unknown)
             return slope
 
-        return Residual(value, by_jump, by_level)
+        return Residual(value, by_jump, by_unknown)
 
 
-def rate(of: Callable[[Loading], Array], loading: Loading, size: float) -> Array:
-    """The derivative with the reservoir level of a function that is nearly linear in it; size: of
-    the dam [m].
+def rate(
+    of: Callable[[Loading], Array], loading: Loading, size: float, unknown: Unknown = LEVEL
+) -> Array:
+    """The derivative with what is unknown in the loading; size: of the dam [m].
 
-    It is zero for an empty reservoir, and displacement control could not start: there it is taken
-    at a small level.
+    A load is linear in its factor. A function is nearly linear in the level; its derivative is zero
+    for an empty reservoir, and displacement control could not start: there it is taken at a small
+    level.
     """
+    if unknown != LEVEL:
+        return of(unknown.at(loading, unknown.of(loading) + 1)) - of(loading)
     step = DIFFERENCE * max(size, abs(loading.level))
     level = loading.level if abs(loading.level) > EMPTY * size else SMALL_LEVEL * size
     above, below = (replace(loading, level=level + s) for s in (step, -step))

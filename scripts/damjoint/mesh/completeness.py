@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import ROUND_OFF
 from ..arrays import Array, IntArray
-from ..input.scene import BED, DOWN, FLOOR, LINES, TOP, UP, Joint
+from ..input.scene import BED, DOWN, FLOOR, LINES, TOP, TRACTION, UP, Joint
 from .body import Body
 from .topology import (
     at,
@@ -247,7 +247,7 @@ def check_faces(geometry: UserGeometry) -> None:
         if inside.any():
             where = at(surface.middles()[np.argmax(inside)])
             raise geometry.bad(f"{name}: must be on the surface of its body; {where} is not")
-    for name in ("crest", *LINES):
+    for name in ("crest", *LINES, TRACTION):
         if (
             name in geometry.regions
             and not np.isin(geometry.regions[name].node_tags, geometry.points[0]).all()

@@ -13,7 +13,7 @@ from .. import InputError, RunError
 from ..arrays import IntArray
 from ..input.case import Case
 from ..input.parameters import constants, start_gmsh
-from ..input.scene import BED, DOWN, FLOOR, LINES, SIDES, TOP, UP, numbered, stacked
+from ..input.scene import BED, DOWN, FLOOR, LINES, SIDES, TOP, TRACTION, UP, numbered, stacked
 
 #: Regions of a user's own geometry by the parameters that need them.
 LOADED = {
@@ -22,6 +22,8 @@ LOADED = {
     "anchor_force": "anchor",
     "force_x": "force",
     "force_y": "force",
+    "traction_x": TRACTION,
+    "traction_y": TRACTION,
 }
 
 #: Codimension of the regions; their numbers are in pro/parameters.pro.
@@ -38,6 +40,8 @@ REGIONS = {
     "ice": 2,
     "force": 2,
     "anchor": 2,
+    "point": 2,
+    TRACTION: 1,
 }
 
 #: Regions of which each joint has its own.
@@ -68,7 +72,7 @@ USER_NAMES = {
     "heel": "heel",
     "toe": "toe",
     "crest": "crest",
-    **{name: name for name in LINES},
+    **{name: name for name in (*LINES, TRACTION)},
 }
 
 USER_FACES = {

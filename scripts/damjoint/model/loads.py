@@ -43,6 +43,29 @@ class Loading:
         return self.grown[list(STAGED).index(name)]
 
 
+@dataclass(frozen=True)
+class Unknown:
+    """What of the loading is unknown under displacement control: the level [m], or the factor of a
+    load of STAGED.
+    """
+
+    load: str = "level"
+
+    def of(self, loading: Loading) -> float:
+        """Its value in a loading."""
+        return loading.level if self.load == "level" else loading.part(self.load)
+
+    def at(self, loading: Loading, value: float) -> Loading:
+        """A loading with another value of it."""
+        if self.load == "level":
+            return replace(loading, level=value)
+        parts = dict(zip(STAGED, loading.grown, strict=True)) | {self.load: value}
+        return replace(loading, grown=tuple(parts.values()))
+
+
+LEVEL = Unknown()
+
+
 def heads_at_ends(
     case: Case,
     level: float,
@@ -78,13 +101,14 @@ COMPLETE = Loading(0.0, 0.0, (1.0,) * len(STAGED))
 
 def line_forces(case: Case, loading: Loading) -> dict[str, tuple[float, float]]:
     """The line forces of a case at a loading along x and y [N/m], in the order of the section's
-    marks.
+    marks; and the traction on a face [Pa].
     """
     angle, pull = math.radians(case["anchor_angle"]), case["anchor_force"]
     full = {
         "ice": (case["ice_force"], 0.0),
         "force": (case["force_x"], case["force_y"]),
         "anchor": (-pull * math.sin(angle), -pull * math.cos(angle)),
+        "traction": (case["traction_x"], case["traction_y"]),
     }
     return {
         name: (loading.part(name) * x, loading.part(name) * y)

@@ -12,7 +12,7 @@ import numpy as np
 from .. import InputError
 from ..arrays import Array, IntArray, distinct
 from ..input.case import Case
-from ..input.values import flows, flows_in_time, has_drains
+from ..input.values import flows, flows_in_time, has_drains, level_unknown
 from ..mesh.body import Body
 from ..mesh.joint_mesh import JointMesh
 
@@ -304,7 +304,7 @@ def plane_paths(network: Network, joints: Sequence[JointMesh], case: Case) -> di
     """
     mesh, y = network.mesh, network.mesh.surface.points[:, 1]
     heels, toes = mesh.heel_nodes[np.argsort(y[mesh.heel_nodes])], mesh.toe_nodes
-    reservoir = max(case.levels) if case["drive"] == "level" else np.inf
+    reservoir = np.inf if level_unknown(case) else max(case.levels)
     reservoir += case["joint_head_offset"]
     if network.branched:
         toes = toes[y[toes] < max(reservoir, *case.tail_levels)]

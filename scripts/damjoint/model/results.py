@@ -13,7 +13,7 @@ import numpy as np
 from .. import ROUND_OFF
 from ..arrays import Array, Table
 from ..input.case import Case
-from ..input.values import flows_in_time
+from ..input.values import flows_in_time, level_unknown
 
 #: Columns of joint.csv: a row per joint node and requested level.
 JOINT = {
@@ -61,7 +61,10 @@ STEPS = {
 HISTORY = {
     "time": ("-", "t of the step"),
     "level": ("m", "reservoir level above the base (y = 0)"),
-    "load_factor": ("-", "ratio of the level to that scheduled for this t"),
+    "load_factor": (
+        "-",
+        "ratio of the level to that scheduled for this t; with drive_load the factor of that load",
+    ),
     "iterations": ("-", "Newton iterations of the step"),
     "cuts": (
         "-",
@@ -89,6 +92,8 @@ HISTORY = {
 }
 #: Additional column in 3D.
 LATERAL = {"T_z": ("N/m", "force on the joint along z, of the effective stress, 3D")}
+#: Additional column with drive = point.
+OF_POINT = {"point_u": ("m", "displacement of the controlled point along drive_direction")}
 #: Additional columns of flow in time. Volumes are per metre of thickness, in 3D too.
 IN_TIME = {
     "water": ("m2", "water stored in the joint, per metre of thickness, with its compression"),
@@ -136,11 +141,18 @@ def with_all_joints(
     return columns | others
 
 
+def of_control(case: Case) -> list[str]:
+    """The columns of a case's history that displacement control determines."""
+    factor = case["drive"] != "level" and not level_unknown(case)
+    return ["load_factor"] * factor + list(OF_POINT) * (case["drive"] == "point")
+
+
 def history_columns(case: Case) -> Columns:
     """The columns of a case's history.csv: unit and meaning."""
     further = LATERAL if case["dim"] == 3 else {}
     in_time = IN_TIME if any(map(flows_in_time, case.joints)) else {}
-    return with_all_joints(HISTORY | further | in_time, case)
+    of_point = {n: column for n, column in OF_POINT.items() if n in of_control(case)}
+    return with_all_joints(HISTORY | further | in_time | of_point, case)
 
 
 #: Columns of quake.csv: unit and meaning. Displacements are relative to the ground.
@@ -324,10 +336,12 @@ def joint_table(case: Case, blocks: list[Array]) -> Table:
 
 
 def history_table(case: Case, rows: Table) -> Table:
-    """The history from an engine's output at each step; adds load_factor and x_resultant."""
+    """The history from an engine's output at each step; adds load_factor, unless it is in it, and
+    x_resultant.
+    """
     scheduled = np.array([case.level_at(time) for time in rows["time"]])
     factor = np.divide(rows["level"], scheduled, out=np.ones_like(scheduled), where=scheduled > 0)
-    rows = rows | {"load_factor": factor}
+    rows = {"load_factor": factor} | rows
     for k, joint in enumerate(case.joints):
         N, M = (rows[column_of(name, k)] for name in "NM")
         # where M = N (length - x)

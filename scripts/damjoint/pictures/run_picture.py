@@ -25,6 +25,7 @@ from matplotlib.tri import Triangulation
 
 from .. import ROUND_OFF
 from ..input.case import Case
+from ..input.values import level_unknown
 from ..mesh.body import Body
 from ..model.fields import Solution, along, distance, joint_body, nearest_rows, state_of
 from ..model.loads import Loading
@@ -761,28 +762,35 @@ def scale_of(values: np.ndarray) -> tuple[float, float]:
 @picture_style()
 def draw_curve(result: Results) -> Figure:
     """Draw the level against the heel's opening; for a uniform pressure also the level at which the
-    rigid dam overturns.
+    rigid dam overturns. Of a controlled point its displacement, of a load its factor.
     """
     case, history = result.case, result.history
+    moved, load = result.heel, history["level"]
+    labels = "opening of the heel", "level [m]"
+    if case["drive"] == "point":
+        moved = history["point_u"]
+        labels = f"displacement of the point along {case['drive_direction']}", labels[1]
+    if not level_unknown(case):
+        load = history["load_factor"]
+        labels = labels[0], f"factor of the {case['drive_load']} [-]"
     figure = figure_of(7, 4.5)
     title = textwrap.wrap(case.title, 80)
     (axes,) = panels(figure, top=0.15 + 0.2 * len(title)).flat
     driven = history["time"] > case["drive_begin"] + ROUND_OFF
     after = history["time"] > case["drive_end"] + ROUND_OFF
-    length, factor = unit([result.heel], LENGTHS)
+    length, factor = unit([moved], LENGTHS)
     for phase, label, style, color in (
         (~driven, "level prescribed", "o-", BLUE),
         (driven & ~after, f"{case['drive']} prescribed", "s-", ORANGE),
         (after, "level prescribed again", "^-", GREEN),
     ):
         steps = np.flatnonzero(phase | np.append(phase[1:], False))  # with the step before
-        opening, level = result.heel[steps] * factor, history["level"][steps]
-        axes.plot(opening, level, style, color=color, markersize=4, label=label)
-    if case["face_load"] == "uniform" and case["uplift"] == "none":
+        axes.plot(moved[steps] * factor, load[steps], style, color=color, markersize=4, label=label)
+    if case["face_load"] == "uniform" and case["uplift"] == "none" and level_unknown(case):
         bound = overturning_level(case)
         label = f"rigid dam overturns: {bound:.3f} m"
         axes.axhline(bound, color="black", linestyle="--", linewidth=0.8, label=label)
-    axes.set(xlabel=f"opening of the heel [{length}]", ylabel="level [m]")
+    axes.set(xlabel=f"{labels[0]} [{length}]", ylabel=labels[1])
     axes.set_title("\n".join(title), fontsize=11, parse_math=False)
     axes.legend(fontsize=8)
     axes.grid(alpha=0.3)

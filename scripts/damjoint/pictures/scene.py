@@ -17,7 +17,7 @@ from .. import ROUND_OFF
 from ..arrays import Array, IntArray, Table
 from ..input.case import Case
 from ..input.parameters import constants
-from ..input.scene import BED, DOWN, FLOOR, SIDES, TOP, UP
+from ..input.scene import BED, DOWN, FLOOR, LINES, POINT, SIDES, TOP, UP
 from ..mesh.body import Body
 from ..model.fields import BROKEN, Field, distance, joint_body, nearest_rows, state_of
 from ..model.loads import COMPLETE, Loading, line_forces, thermal_strains
@@ -183,11 +183,14 @@ def marked(case: Case, bodies: Mapping[str, Body]) -> dict[str, Array]:
     lines those of a section by parameters.
     """
     section, depth = case.section, case["thickness"] if case["dim"] == 3 else 0.0
-    regions = {constants()[name.upper()][0]: name for name in ("ice", "force", "anchor")}
+    names = [name for name in LINES if name != POINT]
+    regions = {constants()[name.upper()][0]: name for name in names}
     corners = zip(
         section["mark_region"], section.get("mark_x", ()), section.get("mark_y", ()), strict=False
     )
-    places = {regions[number]: np.array([x, y, depth]) for number, x, y in corners}
+    places = {
+        regions[number]: np.array([x, y, depth]) for number, x, y in corners if number in regions
+    }
     of_mesh = {name: bodies[name].points for name in regions.values() if name in bodies}
     return places | {name: line[line[:, 2].argmax()] for name, line in of_mesh.items()}
 

@@ -10,7 +10,7 @@ from typing import TextIO
 import numpy as np
 
 from ..arrays import Table
-from ..model.results import Results
+from ..model.results import Results, of_control
 from ..storage import SAVED, atomic_write
 
 #: A column of a table: numbers or texts.
@@ -68,5 +68,6 @@ def write(results: Results, folder: Path) -> None:
             "pressure": pressure,
             "heel_opening": results.heel,
             "crest_ux": history["crest_ux"],
+            **{name: history[name] for name in of_control(case)},
         }
         write_csv(folder / "curve.csv", curve)

@@ -1,14 +1,18 @@
-"""What is prescribed in a step: the level, or a displacement, with the level unknown."""
+"""What is prescribed in a step: the level, or a displacement, with the level or the factor of a
+load unknown.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..arrays import Array
+from ..input.case import Case
+from ..input.scene import POINT
 from ..joint.equilibrium import Equilibrium
-from ..model.loads import Loading
+from ..model.loads import LEVEL, Loading, Unknown
 from .state import State
 
 
@@ -21,9 +25,10 @@ class LevelControl:
 
 @dataclass(frozen=True)
 class DisplacementControl:
-    """A displacement [m]; the level is unknown."""
+    """A displacement [m]; the level, or the factor of a load, is unknown."""
 
     value: float
+    unknown: Unknown = field(default=LEVEL, kw_only=True)
 
     def measure(self, equilibrium: Equilibrium, jump: Array, loading: Loading) -> float:
         """The displacement [m] that is prescribed, at a jump (j,)."""
@@ -34,25 +39,32 @@ class DisplacementControl:
         raise NotImplementedError
 
     def rate(self, equilibrium: Equilibrium, loading: Loading) -> float:
-        """Its derivative with the level."""
+        """Its derivative with what is unknown in the loading."""
         return 0.0
 
 
 @dataclass(frozen=True)
-class CrestControl(DisplacementControl):
-    """The displacement of the crest along x."""
+class BodyControl(DisplacementControl):
+    """A displacement of the bodies, by its name among `Bodies.measures`: by default that of the
+    crest along x.
+    """
+
+    name: str = "crest"
 
     def measure(self, equilibrium: Equilibrium, jump: Array, loading: Loading) -> float:
         """See `DisplacementControl`."""
-        return equilibrium.crest(jump, loading)
+        return equilibrium.displacement(self.name, jump, loading)
 
     def gradient(self, equilibrium: Equilibrium) -> Array:
         """See `DisplacementControl`."""
-        return equilibrium.bulk.crest_jump
+        return equilibrium.bulk.measures[self.name].jump
 
     def rate(self, equilibrium: Equilibrium, loading: Loading) -> float:
         """See `DisplacementControl`."""
-        return equilibrium.crest_rate(loading)
+        return equilibrium.displacement_rate(self.name, loading, self.unknown)
+
+
+CrestControl = BodyControl
 
 
 @dataclass(frozen=True)
@@ -84,7 +96,11 @@ class Prescribed:
     def __init__(self, control: DisplacementControl, equilibrium: Equilibrium) -> None:
         self.control, self.equilibrium = control, equilibrium
         self.stiffness = equilibrium.case["K_N"] * equilibrium.bulk.width
-        self.row, self.highest_level = control.gradient(equilibrium), equilibrium.case.highest_level
+        self.row, self.unknown = control.gradient(equilibrium), control.unknown
+        #: the values that are looked for
+        self.between = -np.inf, np.inf
+        if self.unknown == LEVEL:
+            self.between = 0.0, equilibrium.case.highest_level
 
     def gap(self, jump: Array, loading: Loading) -> float:
         """See `Constraint`."""
@@ -95,8 +111,13 @@ class Prescribed:
         return self.control.rate(self.equilibrium, loading)
 
 
-#: By the value of the parameter `drive`.
-DRIVES = {"crest": CrestControl, "heel": HeelControl}
+def drive_of(case: Case, value: float = 0.0) -> DisplacementControl:
+    """The control of a case by its parameter `drive`, at a displacement [m]."""
+    unknown = Unknown(case["drive_load"])
+    if case["drive"] == "heel":
+        return HeelControl(value, unknown=unknown)
+    name = f"{POINT}_{case['drive_direction']}" if case["drive"] == "point" else "crest"
+    return BodyControl(value, name, unknown=unknown)
 
 
 def process_zone(equilibrium: Equilibrium, state: State) -> Array | None:

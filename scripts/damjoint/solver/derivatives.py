@@ -25,7 +25,7 @@ from ..input.case import Case
 from ..input.parameters import parameter
 from ..input.resolve import varied
 from ..joint.linear_system import Border
-from ..model.loads import Loading
+from ..model.loads import LEVEL, Loading
 from ..model.results import history_table
 from .controls import DisplacementControl, Prescribed
 from .history import History
@@ -159,19 +159,21 @@ class Differentiation:
     def step(self, state: State, update: Trace, low: Side, high: Side) -> tuple[Side, Side]:
         """The states on both sides at the end of a step."""
         end, sides = update.state, (low, high)
-        time, level, jump = end.time, end.loading.level, end.jump
+        time, jump = end.time, end.jump
         begun = [side.model.begin(side.state, time) for side in sides]
         problems = [step.problem for step in begun]
         control = update.control if isinstance(update.control, DisplacementControl) else None
+        unknown = control.unknown if control else LEVEL
+        level, value = end.loading.level, unknown.of(end.loading)
         problem = self.model.begin(state, time).problem
         here = problem.residual(jump, end.loading)
-        tangent, slope = here.by_jump(False), here.by_level() if control else None
+        tangent, slope = here.by_jump(False), here.by_unknown(unknown) if control else None
         rate, level_rate = np.zeros(len(jump)), 0.0
         half = self.distance / 2
         for number in range(CORRECTIONS):
             jumps = [jump - half * rate, jump + half * rate]
             loadings = [
-                step.model.loading(time, level + sign * half * level_rate)
+                unknown.at(step.model.loading(time, level), value + sign * half * level_rate)
                 for step, sign in zip(begun, (-1, 1), strict=True)
             ]
             ends = zip(problems, jumps, loadings, strict=True)
@@ -193,7 +195,7 @@ class Differentiation:
                 self.kink = True
         jumps = [jump - half * rate, jump + half * rate]
         loadings = [
-            step.model.loading(time, level + sign * half * level_rate)
+            unknown.at(step.model.loading(time, level), value + sign * half * level_rate)
             for step, sign in zip(begun, (-1, 1), strict=True)
         ]
         return self.ends(begun, sides, jumps, loadings)

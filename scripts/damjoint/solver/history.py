@@ -12,10 +12,12 @@ import numpy as np
 
 from ..arrays import Array
 from ..input.case import Case
+from ..input.scene import POINT
 from ..joint.equilibrium import Equilibrium
 from ..joint.interface import JointInterface
 from ..joint.water import Pressure
 from ..laws import Law
+from ..model.loads import Unknown
 from ..model.results import (
     HISTORY_OF_JOINTS,
     IN_TIME,
@@ -26,6 +28,7 @@ from ..model.results import (
     history_table,
     joint_columns,
     joint_table,
+    of_control,
 )
 from .model import StepResult
 from .newton import BY_ROUND_OFF
@@ -44,6 +47,16 @@ def recorded(case: Case) -> list[str]:
     """Names of what is recorded of the joints of a case."""
     of_joints = [*RECORDED_OF_JOINTS, *(n for n in history_columns(case) if n in IN_TIME)]
     return [column_of(name, k) for k in range(len(case.joints)) for name in of_joints]
+
+
+def row_of_control(history: History, state: State) -> dict[str, float]:
+    """The columns `of_control` at a state."""
+    case = history.equilibrium.case
+    of = {
+        "load_factor": lambda: Unknown(case["drive_load"]).of(state.loading),
+        "point_u": lambda: history.displacement(f"{POINT}_{case['drive_direction']}", state),
+    }
+    return {name: of[name]() for name in of_control(case)}
 
 
 @dataclass(frozen=True)
@@ -202,7 +215,8 @@ class History:
     by_round_off: list[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        names = *RECORDED, *recorded(self.equilibrium.case)
+        case = self.equilibrium.case
+        names = *RECORDED, *recorded(case), *of_control(case)
         self.rows = self.rows or {name: [] for name in names}
 
     def copy(self) -> History:
@@ -253,6 +267,7 @@ class History:
         for k in range(len(equilibrium.interface.joints)):
             of_joint = JointState(equilibrium, state, k).row
             row |= {column_of(name, k): value for name, value in of_joint.items()}
+        row |= row_of_control(self, state)
         for name, values in self.rows.items():
             values.append(float(row[name]))
         if step.criterion == BY_ROUND_OFF:
@@ -260,8 +275,13 @@ class History:
 
     def crest(self, state: State) -> float:
         """The crest's displacement along x [m]."""
-        crest, rest = self.equilibrium.crest, self.at_rest
-        return crest(state.jump, state.loading) - (crest(rest.jump, rest.loading) if rest else 0.0)
+        return self.displacement("crest", state)
+
+    def displacement(self, name: str, state: State) -> float:
+        """A displacement by its name among `Bodies.measures` [m]."""
+        of, rest = self.equilibrium.displacement, self.at_rest
+        at_rest = of(name, rest.jump, rest.loading) if rest else 0.0
+        return of(name, state.jump, state.loading) - at_rest
 
     def save(self, state: State) -> None:
         """The joints at the state last added, node by node; and with jump and stress extrapolated

@@ -12,7 +12,7 @@ from ..input.case import Case
 from ..joint.interface import Interface
 from ..model.loads import Loading
 from ..model.results import Results
-from .controls import DRIVES, Control, LevelControl
+from .controls import Control, LevelControl, drive_of
 from .history import History
 from .model import Model, StepResult
 from .path import PRECISION, ROUGH, SURE, EquilibriumPath, Point
@@ -106,7 +106,7 @@ class LoadStepper:
         if not begin + SAME_TIME < time:
             return LevelControl(level)
         share = (time - begin) / (end - begin)
-        return DRIVES[case["drive"]](self.displacement_at_begin + case["drive_by"] * share)
+        return drive_of(case, self.displacement_at_begin + case["drive_by"] * share)
 
     def run(self) -> Results:
         """Follow the times of the case from the last state on."""
@@ -146,7 +146,7 @@ class LoadStepper:
 
     def controlled_displacement(self) -> float:
         """The displacement that the case prescribes, in the last state [m]."""
-        return self.model.measure(DRIVES[self.case["drive"]](0.0), self.state)
+        return self.model.measure(drive_of(self.case), self.state)
 
     def accept(self, step: StepResult, cuts: int) -> None:
         """Commit a converged step; cuts: how often it was shortened."""

@@ -20,7 +20,7 @@ from ..joint.flow_in_time import TimeStep
 from ..joint.interface import Interface, interface_of
 from ..joint.problem import JointProblem
 from ..joint.water import BeforeQuake
-from ..model.loads import COMPLETE, Loading
+from ..model.loads import COMPLETE, LEVEL, Loading
 from ..model.network import with_paths
 from .controls import Control, DisplacementControl, LevelControl, Prescribed
 from .newton import BY_TOLERANCE, Convergence, NotConverged, Strategy
@@ -253,12 +253,15 @@ class Model:
         if isinstance(control, DisplacementControl):
             constraint = Prescribed(control, self.equilibrium)
         loading = self.loading(time, state.loading.level)
+        unknown = constraint.unknown if constraint else LEVEL
+        if unknown != LEVEL:
+            loading = replace(loading, level=self.case.level_at(time))
         try:
             solution = solve(problem, loading, plan, constraint)
         except NotConverged as error:
             self.end_of_solution = str(error)
             return None
-        new = step.end(solution.jump, replace(loading, level=solution.level))
+        new = step.end(solution.jump, unknown.at(loading, solution.level))
         residual = solution.size / (self.reference or 1.0)
         new = new.after(state).traced(state, frozen is not None, control)
         return StepResult(new, solution.iterations, residual, solution.criterion)
@@ -271,10 +274,11 @@ class Model:
     def predict(
         self, state: State, time: float, control: Control, extrapolate: bool
     ) -> tuple[Array, float]:
-        """Jump and level where Newton's method starts: the last state's, or extrapolated where the
-        loading continues in the same direction.
+        """Jump, and level or what else is unknown, where Newton's method starts: the last state's,
+        or extrapolated where the loading continues in the same direction.
         """
-        level, before = state.loading.level, state.previous
+        unknown = LEVEL if isinstance(control, LevelControl) else control.unknown
+        level, before = unknown.of(state.loading), state.previous
         prescribed = control.level if isinstance(control, LevelControl) else None
         if extrapolate and before and before.time > 0:
             if self.case["drive"] != "level":
@@ -287,7 +291,7 @@ class Model:
             longest = LONGEST_ALONG_PATH if prescribed is None else LONGEST_EXTRAPOLATION
             if 0 < ahead < longest:
                 jump = state.jump + ahead * (state.jump - before.jump)
-                rise = level - before.loading.level
+                rise = level - unknown.of(before.loading)
                 return jump, level + ahead * rise if prescribed is None else prescribed
         return state.jump, level if prescribed is None else prescribed
 

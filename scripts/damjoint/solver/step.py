@@ -1,11 +1,11 @@
 """A step solved by Newton's method: one strategy after the other, with the level prescribed or,
-under displacement control, unknown. At rest and in motion alike.
+under displacement control, it or the factor of a load unknown. At rest and in motion alike.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -13,31 +13,32 @@ import numpy as np
 from ..arrays import Array
 from ..joint.linear_system import Border
 from ..joint.problem import JointProblem, Residual
-from ..model.loads import Loading
+from ..model.loads import LEVEL, Loading, Unknown
 from .newton import Convergence, Diverged, Iterate, NotConverged, Strategy, newton
 
 
 class Constraint(Protocol):
-    """A displacement that is prescribed in place of the level."""
+    """A displacement that is prescribed in place of the level or of the factor of a load."""
 
     #: [N/m]; weight of its gap in the norm of the residual
     stiffness: float
-    #: its derivative with the jump (j,), and the highest level that is looked for [m]
+    #: its derivative with the jump (j,); what is unknown, and between which values
     row: Array
-    highest_level: float
+    unknown: Unknown
+    between: tuple[float, float]
 
     def gap(self, jump: Array, loading: Loading) -> float:
         """What is missing at a jump (j,) [m]."""
         ...
 
     def rate(self, loading: Loading) -> float:
-        """Its derivative with the level."""
+        """Its derivative with what is unknown."""
         ...
 
 
 @dataclass(frozen=True)
 class Start:
-    """A strategy, and the jump (j,) and the level where it starts."""
+    """A strategy, and where it starts: the jump (j,), and the level or what else is unknown."""
 
     strategy: Strategy
     jump: Array
@@ -59,7 +60,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Solution:
-    """The jump (j,) and the level of a converged step."""
+    """The jump (j,), and the level or what else is unknown, of a converged step."""
 
     jump: Array
     level: float
@@ -74,8 +75,8 @@ def solve(
 ) -> Solution:
     """Solve a step from the first start that leads to convergence.
 
-    loading: at the end of the step, but for the level: that of the start or, with a constraint,
-    unknown. Raises NotConverged, for the last start, if none does.
+    loading: at the end of the step, but for the level, which the start says, or, with a constraint,
+    what is unknown. Raises NotConverged, for the last start, if none does.
     """
     end = NotConverged("there is no strategy")
     for begin in plan.starts:
@@ -97,6 +98,7 @@ def solve_from(
 ) -> Solution:
     """From one start, see `solve`. Raises NotConverged."""
     strategy = begin.strategy
+    unknown = constraint.unknown if constraint else LEVEL
 
     def evaluate(jump: Array, level: float, last: Iterate | None) -> Iterate:
         side = releasing = None
@@ -106,7 +108,7 @@ def solve_from(
                 crossing = side * last.side < 0
                 releasing = crossing & ((side < 0) | (strategy.release > 1))
                 side = np.where(releasing, 0, side)
-        here = replace(loading, level=level)
+        here = unknown.at(loading, level)
         known = begin.residual if last is None and jump is begin.jump else None
         residual = known or problem.residual(jump, here, releasing)
         size, gap = float(np.linalg.norm(residual.value)), 0.0
@@ -118,7 +120,7 @@ def solve_from(
             border = None
             if constraint:
                 rate = constraint.rate(here)
-                border = Border(residual.by_level(), constraint.row, rate, gap)
+                border = Border(residual.by_unknown(unknown), constraint.row, rate, gap)
             return problem.system.solve(residual.by_jump(secant), -residual.value, border)
 
         return Iterate(jump, level, residual.value, size, correction, side)
@@ -128,6 +130,8 @@ def solve_from(
         end, iterations, criterion = newton(evaluate, first, convergence, strategy)
     if np.abs(end.jump).max() > convergence.largest_jump:
         raise Diverged(f"a displacement jump exceeds {convergence.largest_jump:.3g} m")
-    if constraint and not 0 <= end.level <= constraint.highest_level:
-        raise NotConverged(f"the displacement needs a level of {end.level:.6g} m")
+    if constraint:
+        least, most = constraint.between
+        if not least <= end.level <= most:
+            raise NotConverged(f"the displacement needs a level of {end.level:.6g} m")
     return Solution(end.jump, end.level, iterations, end.size, criterion)

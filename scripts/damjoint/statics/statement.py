@@ -6,7 +6,8 @@ import numpy as np
 
 from .. import ROUND_OFF
 from ..input.case import Case
-from ..input.values import has_drains
+from ..input.constraints import STAGED
+from ..input.values import has_drains, level_unknown
 from ..model.results import Results
 from ..units import FORCES, STRESSES, with_unit
 from . import gravity
@@ -121,12 +122,18 @@ def path_statement(results: Results) -> str:
     if not len(level):
         return "no step has converged"
     driven = (time > case["drive_begin"] - ROUND_OFF) & (time < case["drive_end"] + ROUND_OFF)
-    load = case["rho_water"] * case["g"] * level.max()
+    load, what = case["rho_water"] * case["g"] * level.max(), "level"
     text = f"largest load: level {level.max():.5g} m ({with_unit(load, STRESSES, 5)})"
-    if case["drive_by"] < 0:
+    if not level_unknown(case):
+        level, what = np.abs(history["load_factor"]), "factor"
+        acting = [name for name in STAGED[case["drive_load"]] if case[name]]
+        text = f"largest load: {level.max():.5g} times {' and '.join(acting)}"
+    elif case["drive_by"] < 0:
         return text + "; the displacement was reversed"
     falls = bool((np.diff(level[driven]) < 0).any())
+    text += f"; the {what} " + ("falls while the displacement grows" if falls else "always rises")
+    if not level_unknown(case):
+        return text
     moved = history["crest_ux"][driven], results.heel[driven]
     back = any(bool((np.diff(m) < 0).any()) for m in moved)
-    text += "; the level " + ("falls while the displacement grows" if falls else "always rises")
     return text + ("; snap-back occurs" if back else "; no snap-back")

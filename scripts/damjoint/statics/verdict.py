@@ -13,7 +13,7 @@ import numpy as np
 from .. import ROUND_OFF
 from ..arrays import Array
 from ..input.case import Case
-from ..input.values import freezes_uplift
+from ..input.values import freezes_uplift, level_unknown
 from ..model.loads import COMPLETE, thermal_strains
 from ..model.results import Results, row_of_joint
 from . import gravity
@@ -165,7 +165,7 @@ def why_stopped(results: Results) -> Failure:
     """
     case, last = results.case, results.last
     ahead = 2 * last["level"] - [0.0, *results.history["level"]][-2]
-    if case["drive"] != "level" and not 0 <= ahead <= case.highest_level:
+    if level_unknown(case) and not 0 <= ahead <= case.highest_level:
         return Failure("out of range")
     shown = results.info.get("mechanism") or {}
     if shown.get("mode"):

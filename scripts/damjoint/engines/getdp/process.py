@@ -18,7 +18,7 @@ import numpy as np
 from ... import InputError, RunError, data
 from ...input.case import Case
 from ...input.parameters import assignments, constants, declared, listing, quoted
-from ...input.scene import LINES, SIDES
+from ...input.scene import LINES, SIDES, TRACTION
 from ...mesh.chord import Chord
 from ...mesh.joint_mesh import heel_normal
 from ...mesh.mesh import Mesh
@@ -95,6 +95,7 @@ def own_lists(mesh: Mesh) -> dict[str, list[float]]:
     shapes = {shape for solid in mesh.solids.values() for shape, _ in solid.cells}
     number, lowest = numbers(mesh), constants()["UNDER"][0]
     points = np.concatenate([solid.points for solid in mesh.solids.values()])
+    under_traction = [number[mesh.bearer(TRACTION)] + lowest] if TRACTION in bodies else []
     return {
         "own_side": [float(SIDES.index(face.side)) for face in faces],
         "own_body": [number[face.body] + lowest for face in faces],
@@ -106,6 +107,7 @@ def own_lists(mesh: Mesh) -> dict[str, list[float]]:
         "own_quadrangles": [float("quad" in shapes)],
         "own_mark_region": [constants()[name.upper()][0] for name in lines],
         "own_mark_body": [number[mesh.bearer(name)] + lowest for name in lines],
+        **({"own_traction_body": under_traction} if under_traction else {}),
         "own_extent": np.column_stack([points.min(axis=0), points.max(axis=0)]).ravel().tolist(),
     }
 

@@ -25,7 +25,10 @@ from .process import numbers
 
 #: Columns of history.txt (pro/step_control.pro), after the word "step"; and of joints.txt, after
 #: "joint".
-PRINTED = ["time", "level", "iterations", "cuts", "residual", "crest_ux", "heel"]
+PRINTED = [
+    *("time", "level", "iterations", "cuts", "residual", "crest_ux", "heel"),
+    *("load_factor", "point_u"),
+]
 PRINTED_OF_JOINTS = [
     *("crack_length", "process_zone", "slip_length", "max_opening"),
     *("N", "T", "M", "flux", "U", "M_U", "broken_length", "bonded_length", "T_z"),
@@ -73,6 +76,8 @@ def read_history(case: Case, folder: Path) -> dict[str, np.ndarray]:
     of_joints = complete_rows(folder / "joints.txt", PRINTED_OF_JOINTS)
     steps = steps[: len(of_joints) // number]
     printed = dict(zip(PRINTED, steps.T, strict=True))
+    if case["drive_load"] == "level":  # `history_table` makes it from the level
+        del printed["load_factor"]
     for k in range(number):
         rows = of_joints[k::number][: len(steps)]
         names = [column_of(name, k) for name in PRINTED_OF_JOINTS]

@@ -1,0 +1,99 @@
+"""A point's displacement prescribed, and the factor of a load unknown."""
+
+import numpy as np
+import pytest
+from damjoint import InputError, runner
+from damjoint.input.resolve import load
+from damjoint.mesh.mesh import mesh_of
+from damjoint.post import validation
+from numpy.testing import assert_allclose
+from test_engines import agree
+
+POINT = {"drive": "point", "n_joint": 20.0, "uplift": "none"}
+#: Loads with an unknown factor: the value of the full load, and what the displacement grows by.
+LOADS = {
+    "force": ({"force_x": 1e6, "force_y": -2e5}, 2e-3),
+    "quake": ({"k_h": 0.1, "k_v": 0.02}, 2e-3),
+    "level": ({}, 4e-3),
+}
+
+
+def same_columns(one, other, reach=1e-7):
+    """The last rows agree to a part of the largest of their kind."""
+    for names in ("crest_ux", "max_opening"), ("N", "T"), ("level",), ("M",):
+        scale = max(abs(other.last[name]) for name in names)
+        for name in names:
+            assert one.last[name] == pytest.approx(other.last[name], abs=reach * scale), name
+
+
+def test_the_crest_as_a_point_is_the_crest(solve):
+    """Its upstream end, along x, the level unknown."""
+    by = {"drive_by": 4e-3, "n_joint": 20.0, "uplift": "none"}
+    (crest,) = solve("dam", "30,40", drive="crest", **by)
+    (point,) = solve("dam", "30,40", drive="point", drive_face="crest", **by)
+    same_columns(point, crest, 1e-10)
+    assert point.history["point_u"] == pytest.approx(point.history["crest_ux"], rel=1e-10)
+
+
+@pytest.mark.parametrize("of", LOADS)
+@pytest.mark.parametrize("dim", [2, pytest.param(3, marks=pytest.mark.heavy)])
+def test_the_unknown_load_leads_to_the_prescribed_displacement(solve, of, dim):
+    """The load of the factor that was computed, prescribed, leads to the same state."""
+    full, by = LOADS[of]
+    # the downstream end of the crest: a node without a controlled point, too
+    at = {"drive_face": "downstream", "drive_at": 45.0, "drive_direction": "x", "drive_by": by}
+    solid = {"dim": 3.0, "thickness": 5.0, "n_layers": 1.0, "n_joint": 8.0} if dim == 3 else {}
+    settings = POINT | {"sigma_max": 1e4} | solid | full
+    (driven,) = solve("dam", "30,30", drive_load=of, **settings | at)
+    assert not driven.stopped
+    moved = driven.history["point_u"]
+    begun = moved[np.flatnonzero(driven.history["time"] <= 1)[-1]]
+    assert moved[-1] - begun == pytest.approx(by, rel=1e-9)
+    factor = driven.last["load_factor"]
+    level = driven.last["level"] if of == "level" else 30
+    known = settings | {name: factor * value for name, value in full.items()} | {"drive": "level"}
+    (given,) = solve("dam", f"30,{level!r}", **known)
+    same_columns(driven, given)
+    assert driven.last["crack_length"] == pytest.approx(given.last["crack_length"])
+
+
+@pytest.mark.heavy
+def test_both_engines_agree_on_a_factor(tmp_path):
+    """A force that grows until the joint breaks, then falls."""
+    settings = POINT | LOADS["force"][0] | {"drive_load": "force", "drive_by": 2e-3}
+    agree(load("dam", settings | {"drive_at": 30.0}, "30,30"), tmp_path)
+
+
+@pytest.mark.heavy
+def test_getdp_follows_the_published_notched_beam(solve, tmp_path):
+    """SSNP166, beyond the maximum of its load."""
+    options = {"fields": False, "picture": False, "progress": False, "engine": "getdp"}
+    (result,) = runner.run(load("ssnp166"), tmp_path, **options)
+    (fast,) = solve("ssnp166")
+    assert {c.verdict for c in validation.compare(result)} == {"pass"}
+    times = np.isin(fast.history["time"], result.history["time"])
+    for name in ("load_factor", "point_u"):
+        assert_allclose(result.history[name], fast.history[name][times], rtol=1e-6)
+    factor = result.history["load_factor"]
+    assert 0 < factor.argmax() < len(factor) - 1
+
+
+@pytest.mark.parametrize(
+    "settings, message",
+    [
+        ({"drive_at": 50.0}, "drive_at = 50: must lie on the upstream face"),
+        ({"drive_load": "force"}, "drive_load = force: must be level, or force_x or force_y not 0"),
+        ({"drive_load": "quake", "k_h": 0.1, "drive_end": 1.5}, "drive_end = 1.5: must be 2"),
+        ({"drive_load": "ice"}, "drive_load"),
+        ({"drive_direction": "z"}, "drive_direction"),
+    ],
+)
+def test_bad_controls(settings, message):
+    with pytest.raises(InputError, match=message):
+        load("dam", POINT | settings, "30,40")
+
+
+def test_an_own_geometry_needs_the_point():
+    case = load("ssnp143", {"drive": "point"})
+    with pytest.raises(InputError, match="drive = point: must be another one, or geometry"):
+        mesh_of(case)
