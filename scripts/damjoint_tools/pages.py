@@ -237,7 +237,8 @@ def validation_pages() -> None:
         if family != "ssnp142":
             others += [f"## {family.upper()}", f"{shows[0].upper()}{shows[1:]}."]
             others += [report(rows[family], "github", notes=True)]
-    others += [QUAKES, quake_conventions(rows["sdnv138"])]
+        if family == "sdnv138":
+            others += [QUAKES, quake_conventions(rows[family])]
     (REFERENCE / "published.md").write_text("\n\n".join(others) + "\n")
     lines = []
     for family, shows in FAMILIES.items():
@@ -362,7 +363,11 @@ OTHERS = (
     "row of zeros, at rest; without these two differences the tests of this package give the "
     "numbers to 1e-6. The reference of the test file has the values of B with its two points "
     "interchanged, and judges B, C and D by them at 1 to 30 % (no displacement of D): it is not "
-    "used."
+    "used.\n\n"
+    "WTNP128 is judged by the measurements at their published tolerances, and by what the "
+    "published code computes at 0.5 %. The mesh is ours (`geo/wedge.geo`, half of the specimen): "
+    "the wedge is a point force, whose displacement grows as the elements around it get smaller, "
+    "so that half the size moves the forces by 1 %."
 )
 
 

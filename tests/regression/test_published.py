@@ -77,8 +77,9 @@ def test_validate_exits_with_1_if_a_row_fails(command, monkeypatch):
 @pytest.mark.parametrize(
     "family",
     [
-        # long ones, of which test_sdnv138.py and test_law_endo.py have parts by default
-        pytest.param(f, marks=pytest.mark.heavy) if f in ("sdnv138", "ssnp164") else f
+        # long ones, of which other tests have parts by default: test_sdnv138.py, test_law_endo.py,
+        # test_wtnp128.py
+        pytest.param(f, marks=pytest.mark.heavy) if f in ("sdnv138", "ssnp164", "wtnp128") else f
         for f in validation.FAMILIES
         if f != "ssnp142"
     ],

@@ -15,7 +15,7 @@ from ..post.validation import FAMILIES, Comparison
 from ..processes import in_processes
 from ..runner import run
 from ..statics.statement import statement
-from . import law_tests, quake_tests
+from . import law_tests, quake_tests, wedge_tests
 
 
 def chosen(names: Sequence[str]) -> dict[str, list[str]]:
@@ -43,11 +43,14 @@ def tests_without_case(family: str) -> dict[str, Callable[[], dict[str, Array]]]
     """
     laws = law_tests.FAMILIES.get(family, dict)()
     quakes = quake_tests.FAMILIES.get(family, dict)()
+    wedges = wedge_tests.FAMILIES.get(family, dict)()
     tests: dict[str, Callable[[], dict[str, Array]]] = {}
     for name, law in laws.items():
         tests[name] = partial(law_tests.follow, law)
     for name, quake in quakes.items():
         tests[name] = partial(quake_tests.follow, quake, validation.last_time(family))
+    for name, wedge in wedges.items():
+        tests[name] = partial(wedge_tests.follow, wedge)
     return tests
 
 
