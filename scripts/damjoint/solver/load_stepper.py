@@ -14,7 +14,7 @@ from ..model.loads import Loading
 from ..model.results import Results
 from .controls import Control, LevelControl, drive_of
 from .history import History
-from .model import Model, StepResult
+from .model import Attempt, Model, StepResult
 from .path import PRECISION, ROUGH, SURE, EquilibriumPath, Point
 from .relaxation import over_unstable_growth
 from .state import State, Trace
@@ -230,9 +230,7 @@ class LoadStepper:
             self.state,
             time,
             self.control(time),
-            strategies=strategies[:1] if quick else strategies,
-            extrapolate=True,
-            persist=smallest,
+            Attempt(strategies[:1] if quick else strategies, extrapolate=True, persist=smallest),
         )
 
     def moves_pressure(self, step: StepResult) -> bool:
@@ -254,7 +252,7 @@ class LoadStepper:
         step = None
         if self.mechanism is None:
             control, fallback = self.control(target), self.model.strategies[-1:]
-            step = self.model.advance(self.state, target, control, strategies=fallback)
+            step = self.model.advance(self.state, target, control, Attempt(fallback))
             self.end_of_solution = "" if step else self.model.end_of_solution
         self.stopped = step is None
         return step
@@ -331,9 +329,8 @@ class LoadStepper:
             jump = last.state.jump + share * (jump - last.state.jump)
         strategies = self.model.strategies[:FROM_PATH]
         control = LevelControl(level)
-        step = self.model.advance(
-            last.state, time, control, strategies=strategies, guess=(jump, level)
-        )
+        attempt = Attempt(strategies, guess=(jump, level))
+        step = self.model.advance(last.state, time, control, attempt)
         if step is None:
             return None
         self.record_limit_points(levels)

@@ -59,23 +59,76 @@ class StepResult:
 
 
 @dataclass(frozen=True)
+class Attempt:
+    """How a step is solved."""
+
+    #: those of the model by default; the first one that converges ends the attempt
+    strategies: Sequence[Strategy] | None = None
+    #: whether the first one starts from the last two states
+    extrapolate: bool = False
+    #: whether the others follow one that has diverged
+    persist: bool = True
+    #: jump (j,) and level to start from in place of those of the last state
+    guess: tuple[Array, float] | None = None
+
+
+@dataclass(frozen=True)
 class Begun:
     """A step of a model from a state to a time, before it is solved."""
 
     model: Model
-    #: with the internal variables of the step's beginning
+    state: State
+    #: the same with the internal variables of the step's beginning
     start: State
     time: float
     laws: StepLaws
     before_quake: BeforeQuake | None
     #: of what is stored in the joints, see `Model.water_steps`
     steps: tuple[TimeStep, ...]
+    #: whether the damage of the laws is frozen
+    frozen: bool = False
+    #: forces (j,) of the flowing water that do not follow the jumps
+    constant_lift: Array | None = None
 
     @property
     def problem(self) -> JointProblem:
         """Its equation."""
         given = self.start.variables, self.before_quake, self.laws.points, self.steps
-        return self.model.equilibrium.problem(*given)
+        problem = self.model.equilibrium.problem(*given)
+        if self.constant_lift is None:
+            return problem
+        return problem.with_constant_lift(self.constant_lift)
+
+    def solve(self, control: Control, attempt: Attempt) -> StepResult | None:
+        """Solve it by the first strategy of an attempt that converges; None if none does."""
+        model, state, time, tried = self.model, self.state, self.time, attempt.strategies
+        starts = [
+            Start(
+                strategy,
+                *(
+                    attempt.guess
+                    or model.predict(state, time, control, attempt.extrapolate and not n)
+                ),
+            )
+            for n, strategy in enumerate(model.strategies if tried is None else tried)
+        ]
+        plan = Plan(starts, model.convergence, attempt.persist)
+        constraint = None
+        if isinstance(control, DisplacementControl):
+            constraint = Prescribed(control, model.equilibrium)
+        loading = model.loading(time, state.loading.level)
+        unknown = constraint.unknown if constraint else LEVEL
+        if unknown != LEVEL:
+            loading = replace(loading, level=model.case.level_at(time))
+        try:
+            solution = solve(self.problem, loading, plan, constraint)
+        except NotConverged as error:
+            model.end_of_solution = str(error)
+            return None
+        new = self.end(solution.jump, unknown.at(loading, solution.level))
+        residual = solution.size / (model.reference or 1.0)
+        new = new.after(state).traced(state, self.frozen, control)
+        return StepResult(new, solution.iterations, residual, solution.criterion)
 
     def end(self, jump: Array, loading: Loading) -> State:
         """The state at its end, with a jump (j,)."""
@@ -213,63 +266,25 @@ class Model:
         laws = self.equilibrium.laws
         return Begun(
             model=self,
+            state=state,
             start=state.begin_step(laws, time),
             time=time,
             laws=frozen or StepLaws(laws, laws),
             before_quake=self.before_quake(state, time),
             steps=self.water_steps(state, time),
+            frozen=frozen is not None,
         )
 
     def advance(
-        self,
-        state: State,
-        time: float,
-        control: Control,
-        *,
-        strategies: Sequence[Strategy] | None = None,
-        extrapolate: bool = False,
-        persist: bool = True,
-        guess: tuple[Array, float] | None = None,
-        frozen: StepLaws | None = None,
-        constant_lift: Array | None = None,
+        self, state: State, time: float, control: Control, attempt: Attempt | None = None
     ) -> StepResult | None:
-        """A step from a state to a time, by the first strategy that converges; None if none does.
-
-        strategies: those of the model by default; extrapolate: whether the first one starts from
-        the last two states; persist: whether the others follow one that has diverged; guess: jump
-        and level to start from; frozen: the laws with frozen damage; constant_lift (j,): see
-        `JointProblem.with_constant_lift`.
-        """
-        step = self.begin(state, time, frozen)
-        problem = step.problem
-        if constant_lift is not None:
-            problem = problem.with_constant_lift(constant_lift)
-        starts = [
-            Start(strategy, *(guess or self.predict(state, time, control, extrapolate and not n)))
-            for n, strategy in enumerate(self.strategies if strategies is None else strategies)
-        ]
-        plan = Plan(starts, self.convergence, persist)
-        constraint = None
-        if isinstance(control, DisplacementControl):
-            constraint = Prescribed(control, self.equilibrium)
-        loading = self.loading(time, state.loading.level)
-        unknown = constraint.unknown if constraint else LEVEL
-        if unknown != LEVEL:
-            loading = replace(loading, level=self.case.level_at(time))
-        try:
-            solution = solve(problem, loading, plan, constraint)
-        except NotConverged as error:
-            self.end_of_solution = str(error)
-            return None
-        new = step.end(solution.jump, unknown.at(loading, solution.level))
-        residual = solution.size / (self.reference or 1.0)
-        new = new.after(state).traced(state, frozen is not None, control)
-        return StepResult(new, solution.iterations, residual, solution.criterion)
+        """A step from a state to a time; None if no strategy converges."""
+        return self.begin(state, time).solve(control, attempt or Attempt())
 
     def advance_by_first(self, state: State, time: float, control: Control) -> StepResult | None:
         """A step by the first strategy only, from the extrapolation of the last two states."""
         first = self.strategies[:1]
-        return self.advance(state, time, control, strategies=first, extrapolate=True)
+        return self.advance(state, time, control, Attempt(first, extrapolate=True))
 
     def predict(
         self, state: State, time: float, control: Control, extrapolate: bool

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from .controls import Control, LevelControl
-from .model import Model, StepResult
+from .model import Attempt, Model, StepResult
 from .newton import repeats
 from .state import State
 
@@ -40,20 +40,15 @@ def relax(
         start = state.begin_step(laws, time)
         frozen = start.freeze(equilibrium)
         coupled = strategies[:1] if equilibrium.flowing else strategies
-        step = model.advance(start, time, control, strategies=coupled, persist=False, frozen=frozen)
+        begun = model.begin(start, time, frozen)
+        step = begun.solve(control, Attempt(coupled, persist=False))
         if step is None and equilibrium.flowing:
             level = control.level if isinstance(control, LevelControl) else start.loading.level
             opened = before_quake or start
             water = equilibrium.water_in_step(opened.variables, steps=steps)
-            step = model.advance(
-                start,
-                time,
-                control,
-                strategies=strategies,
-                persist=False,
-                frozen=frozen,
-                constant_lift=water.flow(opened.jump, model.loading(time, level)).lift,
-            )
+            lift = water.flow(opened.jump, model.loading(time, level)).lift
+            begun = replace(begun, constant_lift=lift)
+            step = begun.solve(control, Attempt(strategies, persist=False))
         if step is None:
             return None
         iterations += step.iterations
@@ -87,7 +82,8 @@ def over_unstable_growth(
     first, *others = model.strategies
     strategies = [first, *(strategy for strategy in others if strategy.release)]
     guess = relaxed.state.jump, relaxed.state.loading.level
-    step = model.advance(begin, time, control, strategies=strategies, persist=False, guess=guess)
+    attempt = Attempt(strategies, persist=False, guess=guess)
+    step = model.advance(begin, time, control, attempt)
     if step:
         return replace(step, iterations=relaxed.iterations + step.iterations), False
     return (relaxed, True) if accept_relaxed and balanced else (None, False)
