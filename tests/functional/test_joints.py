@@ -7,11 +7,12 @@ from damjoint.input.resolve import load
 from damjoint.joint.interface import interface_of
 from damjoint.mesh.mesh import Mesh
 from damjoint.model.results import column_of
+from damjoint.pictures import run_picture
 from damjoint.post import stored
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics import gravity
 from damjoint.statics.statement import statement
-from damjoint.statics.verdict import failed, verdict
+from damjoint.statics.verdict import decisive_joint, failed, verdict
 from damjoint.studies.check import FINITE_ELEMENTS, GRAVITY, compare_joints
 from damjoint_tools.random_scenes import random_scene
 from scipy.optimize import brentq
@@ -160,6 +161,20 @@ def test_the_table_has_the_rows_of_each_joint():
         assert np.all(np.diff(joint["s"]) > 0)
         assert ("lambda" in joint) == (own.case["law"] == "friction")
     assert np.isnan(rows["lambda"][rows["joint"] != 2]).all()
+
+
+def test_the_joint_of_the_least_factor_speaks_for_a_dam_that_stands():
+    """Though another one has slipped farther; with the coefficient of each joint."""
+    strength = {"mu": (0.1, 1.0, 0.65, 1.0), "adhesion": (5.5e5, 0.0, 0.0, 0.0)}
+    results = solved([40], law="friction", **strength)
+    factors = [
+        (j.case["mu"] * j.last["N"] + j.case["adhesion"] * j.case.joint_length) / j.last["T"]
+        for j in results.joints
+    ]
+    slipped = [j.last["slip_length"] / j.case.joint_length for j in results.joints]
+    assert verdict(results) == "stands"
+    assert decisive_joint(results) == np.argmin(factors) != np.argmax(slipped)
+    assert run_picture.facts_of(results)[1].startswith("lift 12 m: ")
 
 
 def test_a_run_is_read_as_it_was_written(tmp_path):

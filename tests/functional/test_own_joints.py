@@ -9,6 +9,7 @@ from damjoint.engines.getdp import solve as getdp
 from damjoint.input.resolve import load
 from damjoint.joint.interface import interface_of
 from damjoint.mesh.mesh import mesh_of
+from damjoint.post.summary import joints_note, joints_table
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.notes import notes
 from damjoint.statics.verdict import verdict
@@ -65,11 +66,15 @@ def test_an_open_contraction_joint_parts_two_dams(solved):
     """Each block has its own weight, and the left one all of the thrust."""
     soft = {"K_N": (1e11, 1e11, 1.0), "K_T": (5e10, 5e10, 1.0)}
     strong = FRICTION | {"adhesion": 1e30}
-    left, right, between = solved(BLOCKS, BASES | CONTRACTION, [5], **strong, **soft).joints
+    result = solved(BLOCKS, BASES | CONTRACTION, [5], **strong, **soft)
+    left, right, between = result.joints
     thrust = WATER * 5**2 / 2
     assert (left.last["N"], left.last["T"]) == pytest.approx((WEIGHT, thrust), rel=1e-6)
     assert right.last["N"] == pytest.approx(WEIGHT, rel=1e-6)
     assert abs(right.last["T"]) < 1e-6 * thrust and abs(between.last["N"]) < 1e-6 * thrust
+    factors = [row[1] for row in joints_table(result, result.last["time"]).rows]
+    assert [factor.startswith("(") for factor in factors] == [False, False, True]
+    assert joints_note(result.case).startswith("(SSF): between bodies that other joints hold")
 
 
 def test_a_stiff_contraction_joint_glues_two_blocks(solved):

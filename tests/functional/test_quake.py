@@ -25,7 +25,15 @@ from damjoint.joint import linear_system
 from damjoint.post import stored
 from damjoint.post.field_files import everywhere
 from damjoint.solver.history import JointState
-from damjoint.studies import chart, outcome, quake_picture, quake_study, quake_summary, sweep
+from damjoint.studies import (
+    chart,
+    outcome,
+    quake_picture,
+    quake_result,
+    quake_study,
+    quake_summary,
+    sweep,
+)
 from damjoint.studies.plan import Plan
 from damjoint.studies.quake import QuakeRun
 from matplotlib.text import Text
@@ -1144,6 +1152,9 @@ def test_bases_speak_for_the_dam_and_the_map_names_its_joint(tmp_path):
     assert "rigid_block" in result.summary["residual"]
     slips = [abs(result.summary["end"][quake_summary.column_of("slip", k)]) for k in result.joints]
     assert result.joint == np.argmax(slips[:-1])
+    peaks, joints = quake_result.text(case, result.summary, 80).split("\n\n")[1:]
+    assert max(map(len, [*peaks.splitlines(), *joints.splitlines()])) <= 80
+    assert [line.split("  ")[0] for line in joints.splitlines()[-3:]] == [*case.joint_names]
     result.summary["notes"].append("what follows is not reliable")
     texts = [text.get_text() for text in quake_picture.figure(result).findobj(Text)]
     assert not [text for text in texts if re.match("N', contraction|T, contraction", text)]
