@@ -215,13 +215,14 @@ def validation_pages() -> None:
     published numbers, all tests computed again.
     """
     from damjoint.post.validation import FAMILIES, report, worst
-    from damjoint.verification.validate import compare, tests_of
+    from damjoint.verification.validate import Options, compare, tests_of
 
     from .provenance import provenance, source_line
 
     source = source_line([provenance()], "Computed")
     with tempfile.TemporaryDirectory() as folder:
-        rows = {f: list(compare(f, tests_of(f), Path(folder), "auto", False)) for f in FAMILIES}
+        options = Options(Path(folder), picture=False)
+        rows = {f: list(compare(f, tests_of(f), options)) for f in FAMILIES}
     dams = [
         "# SSNP142: computed and published values",
         SSNP142,
@@ -353,6 +354,11 @@ OTHERS = (
     "0.2 %. The table of a 3D test is read along z = 1 m, as published. In C and D the published "
     "test moves one side of the blocks; here they are warmed to the same effect. The shear of a "
     "few Pa in E to H comes from the mesh, the two blocks are symmetric; it is not judged.\n\n"
+    "SSNP133: about as many elements as published; the triangles of the published mesh are not "
+    "known. The path is jagged, a tooth for each element that breaks: at the third published "
+    "point, 7.724e-3 m at 4.74e6 N, meshes with the same numbers of elements give -3 to +7 %, so "
+    "it is not judged. SSNP166: the support holds the end face; at a point, as published, it "
+    "would make a dent that depends on the mesh.\n\n"
     "SSNP162: B, C, M, N and O are A on other elements, F, Q and R are E, H and I are G, P is D, "
     "K and L are J. The closed form of D II leaves out the hardening that the published code and "
     "we have. In SSNP164 C the shear across the joint is not judged: the published code has "

@@ -117,6 +117,11 @@ def unit_loads(space: Space, mesh: Mesh, name: str) -> Iterator[tuple[str, Array
                 yield f"{line}_{'xyz'[component]}", load
 
 
+def measured_load(case: Case) -> tuple[str, ...]:
+    """The region of the load whose work dissipation control needs."""
+    return (case["drive_load"],) if case["drive"] == "dissipation" else ()
+
+
 def unit_strains(case: Case) -> dict[str, tuple[str, Distribution]]:
     """Region and distribution of the thermal strains of a case, by name."""
     distributions: dict[str, Distribution] = {
@@ -150,6 +155,8 @@ class Bodies:
     by_name: dict[str, ElasticBody]
     #: wall seconds of their assembly
     seconds: float
+    #: regions whose displacements are needed besides the crest's, see `measures`
+    measured: tuple[str, ...] = ()
 
     @staticmethod
     def of(case: Case) -> Bodies:
@@ -157,7 +164,9 @@ class Bodies:
         mesh = mesh_of(case)
         start = time.perf_counter()
         by_name = {name: ElasticBody.of(case, mesh, name) for name in mesh.solids}
-        return Bodies(mesh=mesh, by_name=by_name, seconds=time.perf_counter() - start)
+        measured = (POINT,) * (POINT in mesh.bodies) + measured_load(case)
+        seconds = time.perf_counter() - start
+        return Bodies(mesh=mesh, by_name=by_name, seconds=seconds, measured=measured)
 
     def loaded_dofs(self, name: str) -> IntArray:
         """Degrees of freedom of the wet faces of a body that a pressure loads: none along an axis
@@ -181,17 +190,17 @@ class Bodies:
     @property
     def measures(self) -> dict[str, tuple[str, Array]]:
         """Displacements that may be prescribed or printed, each a body and what they are of its
-        degrees of freedom (n,): crest, along x; point_x, point_y, those that the unit forces on the
-        controlled point do work on, in 3D means over its line.
+        degrees of freedom (n,): crest, along x; point_x, point_y, ..., those that unit forces on a
+        region do work on, over the thickness: of the controlled point the mean over its line in 3D.
         """
         body, crest = self.crest
         row = np.zeros(self.by_name[body].stiffness.shape[0])
         row[crest] = 1.0
         measures = {"crest": (body, row)}
-        if POINT in self.mesh.bodies:
-            bearer, width = self.mesh.bearer(POINT), self.mesh.joints[0].width
+        for region in self.measured:
+            bearer, width = self.mesh.bearer(region), self.mesh.joints[0].width
             loads = self.by_name[bearer].unit_loads
-            measures |= {n: (bearer, loads[n] / width) for n in (f"{POINT}_x", f"{POINT}_y")}
+            measures |= {n: (bearer, loads[n] / width) for n in (f"{region}_x", f"{region}_y")}
         return measures
 
     @property

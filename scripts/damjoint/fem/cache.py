@@ -53,7 +53,8 @@ def key_of(case: Case) -> tuple[object, ...]:
         shape = fingerprint(mesh_of(case))
         under_water = case.reached, max(case.tail_levels), case["floor_water"], overtopped(case)
     thermal = thermal_strains(case, COMPLETE)
-    return (shape, *(case[n] for n in PARAMETERS), *under_water, *thermal)
+    needed = *(case[n] for n in PARAMETERS), *under_water, *thermal
+    return shape, *needed, *((case["drive_load"],) if case["drive"] == "dissipation" else ())
 
 
 @lru_cache(maxsize=1)

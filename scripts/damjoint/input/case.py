@@ -37,7 +37,7 @@ from .values import has_drains as has_drains
 SHARED = (
     *("strategy_growth", "strategy_secant", "strategy_release", "strategy_iterations", "cut"),
     *("round_off", "rounding_ceiling", "artificial", "yield_tolerance", "release_length"),
-    *("crack_aperture", "crack_most", "zangar_angle", "zangar_cm"),
+    *("crack_aperture", "crack_most", "zangar_angle", "zangar_cm", "dissipation_shift"),
 )
 
 #: Those of them that the laws use.

@@ -15,7 +15,14 @@ import numpy as np
 from .. import InputError
 from ..laws import LAWS
 from .parameters import constants, declared
-from .values import ParameterValues, flows, flows_in_time, has_drains, level_unknown
+from .values import (
+    ParameterValues,
+    flows,
+    flows_in_time,
+    has_drains,
+    has_point,
+    level_unknown,
+)
 
 #: Usual values, from and to, in SI units: a density of 24 kN/m3 or a strength of 0.2 MPa without
 #: its unit is none.
@@ -246,7 +253,7 @@ def check_section(case: ParameterValues, section: Mapping[str, Sequence[float]])
         ("anchor_force", "anchor_at", "ANCHOR", "the crest"),
         ("drive", "drive_at", "POINT", f"the {case['drive_face']} face"),
     ):
-        acts = case["drive"] == "point" if force == "drive" else case[force]
+        acts = has_point(case) if force == "drive" else case[force]
         if acts and regions[region][0] not in marks:
             raise InputError(f"{name} = {case[name]:g}: must lie on {face} of the dam")
     simple = not (batter or case["neck_height"] or case["joint_height"] or marks)
@@ -487,6 +494,11 @@ def check_drive(case: ParameterValues, last: int) -> None:
     its factor is unknown to the end.
     """
     begin, end, load = case["drive_begin"], case["drive_end"], case["drive_load"]
+    if case["drive"] == "dissipation":
+        if load not in ("force", "traction"):
+            raise InputError(f"drive_load = {load}: must be force or traction with dissipation")
+        if not case["drive_energy"]:
+            raise InputError("drive_energy = 0: must be > 0 N m per m with drive = dissipation")
     if load != "level":
         sizes = STAGED[load]
         if not any(case[name] for name in sizes):

@@ -95,6 +95,11 @@ def level_unknown(values: Values | ParameterValues) -> bool:
     return values["drive"] != "level" and values["drive_load"] == "level"
 
 
+def has_point(values: Values | ParameterValues) -> bool:
+    """Whether the displacement of a point is prescribed or, under dissipation control, recorded."""
+    return values["drive"] in ("point", "dissipation")
+
+
 def flows(values: Values | ParameterValues) -> bool:
     """Whether the water pressure in the joint depends on its opening."""
     return values["uplift"] in ("cracked", "flow")

@@ -8,7 +8,7 @@ from ..arrays import Setting
 from ..input.case import Case
 from ..input.geometry_file import opened
 from ..input.parameters import assignments, listing, start_gmsh
-from ..input.values import has_drains
+from ..input.values import has_drains, has_point
 
 #: Parameters that the mesh always depends on.
 GEOMETRY = (
@@ -32,8 +32,8 @@ def shares(case: Case) -> dict[str, Setting]:
     """
     names = [*GEOMETRY, *(n for force, needs in MARKS.items() if case[force] for n in needs)]
     values: dict[str, Setting] = {name: case[name] for name in names}
-    if case["drive"] == "point":
-        values |= {name: case[name] for name in ("drive", "drive_face", "drive_at")}
+    if has_point(case):
+        values |= {"drive": "point"} | {name: case[name] for name in ("drive_face", "drive_at")}
     # of a force only whether it acts
     values |= {name: float(bool(case[name])) for name in MARKS}
     if has_drains(case):  # they need a node in all modes of uplift

@@ -16,6 +16,7 @@ from ..input.constraints import check_levels_on_mesh, check_strain
 from ..input.geometry_file import FileStates, state_of
 from ..input.parameters import constants, start_gmsh
 from ..input.scene import POINT, Joint, numbered, stacked
+from ..input.values import has_point
 from ..storage import check_end
 from .body import Body
 from .completeness import check
@@ -87,10 +88,10 @@ def check_loads(case: Case, mesh: Mesh) -> None:
                 f"{name} = {case[name]:g}: must be 0, or geometry = {case.geometry} have the "
                 f"region {group}"
             )
-    if case["drive"] == POINT and POINT not in mesh.bodies:
+    if has_point(case) and POINT not in mesh.bodies:
         raise InputError(
-            f"drive = point: must be another one, or geometry = {case.geometry} have the region "
-            "point"
+            f"drive = {case['drive']}: must be another one, or geometry = {case.geometry} have the "
+            "region point"
         )
     if case.source:
         case.source.check_lists([joint.name for joint in mesh.joints])

@@ -13,7 +13,7 @@ import numpy as np
 from .. import ROUND_OFF
 from ..arrays import Array, Table
 from ..input.case import Case
-from ..input.values import flows_in_time, level_unknown
+from ..input.values import flows_in_time, has_point, level_unknown
 
 #: Columns of joint.csv: a row per joint node and requested level.
 JOINT = {
@@ -92,7 +92,7 @@ HISTORY = {
 }
 #: Additional column in 3D.
 LATERAL = {"T_z": ("N/m", "force on the joint along z, of the effective stress, 3D")}
-#: Additional column with drive = point.
+#: Additional column with drive = point, dissipation.
 OF_POINT = {"point_u": ("m", "displacement of the controlled point along drive_direction")}
 #: Additional columns of flow in time. Volumes are per metre of thickness, in 3D too.
 IN_TIME = {
@@ -144,7 +144,7 @@ def with_all_joints(
 def of_control(case: Case) -> list[str]:
     """The columns of a case's history that displacement control determines."""
     factor = case["drive"] != "level" and not level_unknown(case)
-    return ["load_factor"] * factor + list(OF_POINT) * (case["drive"] == "point")
+    return ["load_factor"] * factor + list(OF_POINT) * has_point(case)
 
 
 def history_columns(case: Case) -> Columns:

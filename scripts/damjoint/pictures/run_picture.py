@@ -25,7 +25,7 @@ from matplotlib.tri import Triangulation
 
 from .. import ROUND_OFF
 from ..input.case import Case
-from ..input.values import level_unknown
+from ..input.values import has_point, level_unknown
 from ..mesh.body import Body
 from ..model.fields import Solution, along, distance, joint_body, nearest_rows, state_of
 from ..model.loads import Loading
@@ -766,12 +766,12 @@ def draw_curve(result: Results) -> Figure:
     """
     case, history = result.case, result.history
     moved, load = result.heel, history["level"]
-    labels = "opening of the heel", "level [m]"
-    if case["drive"] == "point":
+    labels, prescribed = ("opening of the heel", "level [m]"), "level prescribed"
+    if has_point(case):
         moved = history["point_u"]
         labels = f"displacement of the point along {case['drive_direction']}", labels[1]
     if not level_unknown(case):
-        load = history["load_factor"]
+        load, prescribed = history["load_factor"], "load prescribed"
         labels = labels[0], f"factor of the {case['drive_load']} [-]"
     figure = figure_of(7, 4.5)
     title = textwrap.wrap(case.title, 80)
@@ -780,10 +780,12 @@ def draw_curve(result: Results) -> Figure:
     after = history["time"] > case["drive_end"] + ROUND_OFF
     length, factor = unit([moved], LENGTHS)
     for phase, label, style, color in (
-        (~driven, "level prescribed", "o-", BLUE),
+        (~driven, prescribed, "o-", BLUE),
         (driven & ~after, f"{case['drive']} prescribed", "s-", ORANGE),
-        (after, "level prescribed again", "^-", GREEN),
+        (after, f"{prescribed} again", "^-", GREEN),
     ):
+        if not phase.any():
+            continue
         steps = np.flatnonzero(phase | np.append(phase[1:], False))  # with the step before
         axes.plot(moved[steps] * factor, load[steps], style, color=color, markersize=4, label=label)
     if case["face_load"] == "uniform" and case["uplift"] == "none" and level_unknown(case):

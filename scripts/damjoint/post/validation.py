@@ -20,6 +20,7 @@ from ..model.results import Results
 FAMILIES = {
     "ssnp142": "a 10 m dam under rising water: rupture and friction, uplift, flow, 2D and 3D, past "
     "the critical load",
+    "ssnp133": "a plate torn off its base, rupture: the path of its force through two snap-backs",
     "ssnp143": "two blocks on a vertical joint: grouted, sawn; rupture and friction, 2D and 3D",
     "ssnp162": "the laws rupture and friction at one point: to and fro in tension and shear",
     "ssnp164": "the law endo at one point: tension, shear, both, opened and lifted by water",

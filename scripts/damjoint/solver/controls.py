@@ -42,6 +42,10 @@ class DisplacementControl:
         """Its derivative with what is unknown in the loading."""
         return 0.0
 
+    def stiffness(self, equilibrium: Equilibrium) -> float:
+        """The weight of what is missing of it in the norm of the residual, N over its unit."""
+        return equilibrium.case["K_N"] * equilibrium.bulk.width
+
 
 @dataclass(frozen=True)
 class BodyControl(DisplacementControl):
@@ -87,6 +91,59 @@ class DirectionControl(DisplacementControl):
         return self.direction
 
 
+@dataclass(frozen=True)
+class DissipationControl(DisplacementControl):
+    """The energy that is dissipated in a step [N m per m of thickness], with a small part of the
+    work of the load of unknown factor, by which it grows where nothing breaks, too: the area that
+    the path of factor lambda and work U of the load of factor 1 sweeps about (U, -shift),
+    ((lambda_0 + shift) U - (lambda + shift) U_0) / 2, from lambda_0, U_0 at the step's beginning
+    [Gutierrez 2004; Verhoosel, Remmers, Gutierrez 2009]. Exact where unloading goes to U = 0.
+    """
+
+    #: lambda_0 + shift, U_0, and U before the control began
+    factor: float = 0.0
+    work: float = 0.0
+    begun: float = 0.0
+    shift: float = 0.0
+
+    def measure(self, equilibrium: Equilibrium, jump: Array, loading: Loading) -> float:
+        """See `DisplacementControl`."""
+        work = work_of(equilibrium, jump, loading) - self.begun
+        return (self.factor * work - (self.unknown.of(loading) + self.shift) * self.work) / 2
+
+    def gradient(self, equilibrium: Equilibrium) -> Array:
+        """See `DisplacementControl`."""
+        row = sum(
+            size * equilibrium.bulk.measures[name].jump for name, size in load_of(equilibrium)
+        )
+        return np.asarray(self.factor / 2 * row)
+
+    def rate(self, equilibrium: Equilibrium, loading: Loading) -> float:
+        """See `DisplacementControl`."""
+        by_load = sum(
+            size * equilibrium.displacement_rate(name, loading, self.unknown)
+            for name, size in load_of(equilibrium)
+        )
+        return (self.factor * by_load - self.work) / 2
+
+    def stiffness(self, equilibrium: Equilibrium) -> float:
+        """See `DisplacementControl`."""
+        return float(np.linalg.norm(self.gradient(equilibrium))) / abs(self.value)
+
+
+def load_of(equilibrium: Equilibrium) -> list[tuple[str, float]]:
+    """The components of the load of unknown factor, as unit loads, and their sizes."""
+    load = equilibrium.case["drive_load"]
+    return [(f"{load}_{axis}", equilibrium.case[f"{load}_{axis}"]) for axis in "xy"]
+
+
+def work_of(equilibrium: Equilibrium, jump: Array, loading: Loading) -> float:
+    """The work of the load of unknown factor, for the factor 1 [N m per m of thickness]."""
+    return sum(
+        size * equilibrium.displacement(name, jump, loading) for name, size in load_of(equilibrium)
+    )
+
+
 Control = LevelControl | DisplacementControl
 
 
@@ -95,7 +152,7 @@ class Prescribed:
 
     def __init__(self, control: DisplacementControl, equilibrium: Equilibrium) -> None:
         self.control, self.equilibrium = control, equilibrium
-        self.stiffness = equilibrium.case["K_N"] * equilibrium.bulk.width
+        self.stiffness = control.stiffness(equilibrium)
         self.row, self.unknown = control.gradient(equilibrium), control.unknown
         #: the values that are looked for
         self.between = -np.inf, np.inf

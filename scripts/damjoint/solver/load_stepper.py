@@ -10,9 +10,9 @@ import numpy as np
 
 from ..input.case import Case
 from ..joint.interface import Interface
-from ..model.loads import Loading
+from ..model.loads import Loading, Unknown
 from ..model.results import Results
-from .controls import Control, LevelControl, drive_of
+from .controls import Control, DissipationControl, LevelControl, drive_of, work_of
 from .history import History
 from .model import Attempt, Model, StepResult
 from .path import PRECISION, ROUGH, SURE, EquilibriumPath, Point
@@ -106,6 +106,8 @@ class LoadStepper:
         if not begin + SAME_TIME < time:
             return LevelControl(level)
         share = (time - begin) / (end - begin)
+        if case["drive"] == "dissipation":
+            return self.dissipation(case["drive_energy"] * (time - self.state.time) / (end - begin))
         return drive_of(case, self.displacement_at_begin + case["drive_by"] * share)
 
     def run(self) -> Results:
@@ -145,8 +147,24 @@ class LoadStepper:
         return True
 
     def controlled_displacement(self) -> float:
-        """The displacement that the case prescribes, in the last state [m]."""
+        """The displacement that the case prescribes, in the last state [m]; under dissipation
+        control the work of the load of factor 1 [N m per m].
+        """
+        if self.case["drive"] == "dissipation":
+            return work_of(self.model.equilibrium, self.state.jump, self.state.loading)
         return self.model.measure(drive_of(self.case), self.state)
+
+    def dissipation(self, energy: float) -> DissipationControl:
+        """The control of an energy [N m per m] from the last state on."""
+        unknown, shift = Unknown(self.case["drive_load"]), self.case.shared["dissipation_shift"][0]
+        return DissipationControl(
+            energy,
+            unknown=unknown,
+            factor=unknown.of(self.state.loading) + shift,
+            work=self.controlled_displacement() - self.displacement_at_begin,
+            begun=self.displacement_at_begin,
+            shift=shift,
+        )
 
     def accept(self, step: StepResult, cuts: int) -> None:
         """Commit a converged step; cuts: how often it was shortened."""

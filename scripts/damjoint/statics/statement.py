@@ -131,6 +131,10 @@ def path_statement(results: Results) -> str:
     elif case["drive_by"] < 0:
         return text + "; the displacement was reversed"
     falls = bool((np.diff(level[driven]) < 0).any())
+    if case["drive"] == "dissipation":
+        moves = np.diff(history["point_u"][driven])
+        turns = bool((moves < 0).any() and (moves > 0).any())
+        return text + "; the point " + ("moves to and fro: snap-back" if turns else "moves one way")
     text += f"; the {what} " + ("falls while the displacement grows" if falls else "always rises")
     if not level_unknown(case):
         return text

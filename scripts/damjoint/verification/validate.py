@@ -15,7 +15,7 @@ from ..post.validation import FAMILIES, Comparison
 from ..processes import in_processes
 from ..runner import run
 from ..statics.statement import statement
-from . import law_tests, quake_tests, wedge_tests
+from . import law_tests, path_tests, quake_tests, wedge_tests
 
 
 def chosen(names: Sequence[str]) -> dict[str, list[str]]:
@@ -47,6 +47,8 @@ def tests_without_case(family: str) -> dict[str, Callable[[], dict[str, Array]]]
     tests: dict[str, Callable[[], dict[str, Array]]] = {}
     for name, law in laws.items():
         tests[name] = partial(law_tests.follow, law)
+    for name, path in path_tests.FAMILIES.get(family, dict)().items():
+        tests[name] = partial(path_tests.follow, path)
     for name, quake in quakes.items():
         tests[name] = partial(quake_tests.follow, quake, validation.last_time(family))
     for name, wedge in wedges.items():

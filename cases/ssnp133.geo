@@ -1,0 +1,23 @@
+// Mesh of ssnp133.case.
+// Made by python -m damjoint_tools.gmsh_files ssnp133.case, for dim = 2.
+Include "../pro/units.pro";
+Include "ssnp133.case";
+Include "../geo/window.geo";
+Include "../geo/ssnp133.geo";
+If(dim != 2)
+  Error("dim = %g: must be 2, as in ssnp133.case", dim);
+EndIf
+Mesh.MshFileVersion = 2.2;
+Delete Physicals;
+Physical Point(7) = {1};
+Physical Point(8) = {2};
+Physical Point(9) = {7};
+Physical Point(15) = {3};
+Physical Point(1007) = {4};
+Physical Point(1008) = {5};
+Physical Curve(3) = {1};
+Physical Curve(6) = {11, 13};
+Physical Curve(16) = {6};
+Physical Curve(1003) = {4};
+Physical Surface(1) = {1};
+Physical Surface(2) = {2 : 3};
