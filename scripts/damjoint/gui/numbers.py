@@ -207,8 +207,10 @@ def table_of_levels(result: Results) -> Table:
 
 
 def warnings(result: Results) -> list[str]:
-    """The remarks and hints that the command line prints before and below its table."""
+    """The hints that the command line prints below its table, then its remarks on the case: what a
+    result means comes first where there is not room for all.
+    """
     path = [path_statement(result)] if result.case["drive"] != "level" else []
     accuracy = result.info.get("error_estimate", {}).get("statement")
     notes = result.info.get("notes", [])
-    return [*notes, *path, *hints(result), *([accuracy] if accuracy else [])]
+    return [*path, *hints(result), *([accuracy] if accuracy else []), *notes]

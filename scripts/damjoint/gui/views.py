@@ -313,7 +313,8 @@ def show_strips(gallery: Gallery, deformed: Deformed, display: Display) -> None:
 def show_warnings(gallery: Gallery, warnings: list[str], layout: Layout) -> None:
     """Show warnings at the bottom of the scene, as many lines as there is space for."""
     lines = [line for warning in warnings for line in layout.wrapped(f"! {warning}", SIZES[3])]
-    lines = lines[: places.WARNINGS]
+    if len(lines) > places.WARNINGS:
+        lines = [*lines[: places.WARNINGS - 1], "... all notes are in Results"]
     for number, line in enumerate(lines):
         y = -places.LINE * (len(lines) - number) + 8
         gallery.write(LEFT, y, [line], ORANGE, SIZES[3])
