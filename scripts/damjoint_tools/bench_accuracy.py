@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from damjoint import accuracy as refinement
@@ -35,7 +36,7 @@ ROCK = {"E_dam": 2e10, "E_found": 3e10, "sigma_max": 2e4, "adhesion": 1e5, "mu":
 
 #: Scenes with the stiffness of a real dam: case, parameters besides ROCK, K_N = K_T [Pa/m],
 #: levels [m].
-DAMS = {
+DAMS: dict[str, tuple[str, dict[str, Any], float, str | None]] = {
     "rupture, no uplift": ("dam", {"law": "rupture", "uplift": "none"}, 1e12, "45,49"),
     "rupture, imposed": ("dam", {"law": "rupture", "uplift": "imposed"}, 1e11, "40,45"),
     "rupture, flow": ("dam", {"law": "rupture", "uplift": "flow"}, 1e11, "40,45"),
@@ -108,7 +109,7 @@ def accuracy(measurements: Measurements, exact: dict[str, np.ndarray], start: fl
     measured = "unknowns", "seconds", *PARTS, *(f"error_{q}" for q in QUANTITIES), "worst"
     table = Table("accuracy", "scene", *columns, *measured)
 
-    def measure(name: str, mesh: tuple) -> tuple:
+    def measure(name: str, mesh: tuple[Any, ...]) -> tuple[Any, ...]:
         dim, pattern, order, n, grading, steps = mesh
         settings = mesh_settings(order, n, grading, pattern, dim) | {"uplift": main_uplift(name)}
         result, spent = solve_timed(
@@ -124,7 +125,7 @@ def accuracy(measurements: Measurements, exact: dict[str, np.ndarray], start: fl
     return table
 
 
-def meshes(short: bool) -> list[tuple]:
+def meshes(short: bool) -> list[tuple[Any, ...]]:
     """Return the meshes of the error-against-time benchmark: dimension, pattern, order, elements
     along the joint, grading, steps.
     """
@@ -157,7 +158,7 @@ def recommended(measurements: Measurements, exact: dict[str, np.ndarray]) -> Tab
     def worst(result: Results, name: str) -> float:
         return 100 * float(np.max(relative_errors(quantities(result), exact[name])))
 
-    def measure(name: str) -> list:
+    def measure(name: str) -> list[Any]:
         main = {"uplift": main_uplift(name)}
         row = [worst(solve_timed(load(name, main))[0], name), PUBLISHED[name]]
         for level in levels:
@@ -192,7 +193,7 @@ def estimates(measurements: Measurements) -> Table:
     columns = [n for n in refinement.QUANTITIES if n not in ("level", "toe_stress")]
     table = Table("estimates", "scene", "accuracy", "reached", "n_joint", *columns)
 
-    def measure(scene: str) -> list[list]:
+    def measure(scene: str) -> list[list[Any]]:
         name, differs, stiffness, water = DAMS[scene]
         settings = ROCK | {"K_N": stiffness, "K_T": stiffness} | differs
         solid = settings.get("dim") == 3
@@ -222,7 +223,7 @@ def refined(case: Case, n: float) -> Case:
     return replace(refinement.halve_steps(refinement.halve_steps(finer)), accuracy=None)
 
 
-def estimated_and_true(name: str, record: dict, result: Results, exact: Results) -> str:
+def estimated_and_true(name: str, record: dict[str, Any], result: Results, exact: Results) -> str:
     """Return the estimated and the true error [%] of a quantity, over all levels that both results
     have reached; empty if there is no estimate.
     """

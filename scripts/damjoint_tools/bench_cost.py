@@ -7,10 +7,12 @@ from __future__ import annotations
 import os
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from functools import partial
 from itertools import product
 from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 from damjoint import RunError
@@ -24,7 +26,7 @@ from damjoint.progress import track
 from damjoint.runner import run
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.verdict import verdict
-from damjoint.studies.sweep import stepped
+from damjoint.studies.sweep import Solved, stepped
 from threadpoolctl import threadpool_limits
 
 from .bench_scenes import (
@@ -38,6 +40,9 @@ from .bench_scenes import (
 )
 from .bench_table import Measurements, Table
 
+#: What is measured.
+Call: TypeAlias = Callable[[], object]
+
 
 def cases(measurements: Measurements) -> Table:
     """Measure all scenes of each modeling with published steps and meshes of the published size:
@@ -47,7 +52,7 @@ def cases(measurements: Measurements) -> Table:
     columns = "seconds", *PARTS, "MB", "published", "times faster", "GetDP", "times faster, GetDP"
     table = Table("cases", "case", *columns)
 
-    def measure(name: str) -> tuple:
+    def measure(name: str) -> tuple[Any, ...]:
         wall, record = run_cold([name])
         spent = [record["wall_seconds"][PART_OF_RUN.get(part, part)] for part in PARTS[1:]]
         getdp = float("nan") if measurements.short else run_cold([name, "--engine", "getdp"])[0]
@@ -77,7 +82,7 @@ def growth(measurements: Measurements) -> Table:
     sizes = [(2, 2, n) for n in ((50, 100) if short else (50, 100, 200, 400))]
     sizes += [(3, 1, n) for n in ((20,) if short else (20, 40, 60, 90, 125))]
 
-    def measure(dim: int, order: int, n: int) -> tuple:
+    def measure(dim: int, order: int, n: int) -> tuple[Any, ...]:
         settings = {"dim": dim, "order": order, "n_joint": n, "mesh_pattern": "free"}
         settings["uplift"] = "imposed"
         # uniform refinement: all element sizes in proportion to the joint's
@@ -103,7 +108,7 @@ def engines(measurements: Measurements) -> Table:
     table = Table("engines", "engine", "n_joint", "unknowns", "seconds", *parts, "MB")
     sizes = {"condensed": (10, 16, 27), "iterative": (10, 16, 27, 39, 62)}
 
-    def measure(engine: str, n: int) -> tuple:
+    def measure(engine: str, n: int) -> tuple[Any, ...]:
         # uniform refinement of the default mesh
         settings = {"n_joint": n, "h_dam": 80 / n, "h_found": 250 / n}
         words = [word for k, v in settings.items() for word in ("--set", f"{k}={v}")]
@@ -157,7 +162,9 @@ def switches(measurements: Measurements) -> Table:
             spent.append(time.perf_counter() - start)
         return min(spent)
 
-    def measure(with_option: Callable, without_option: Callable) -> tuple[float, float, float]:
+    def measure(
+        with_option: Callable[[], object], without_option: Callable[[], object]
+    ) -> tuple[float, float, float]:
         seconds = best(with_option), best(without_option)
         return *seconds, seconds[0] / seconds[1]
 
@@ -168,13 +175,20 @@ def switches(measurements: Measurements) -> Table:
     return table
 
 
-def options(folder: Path) -> dict[str, tuple[Callable, Callable]]:
+def options(folder: Path) -> dict[str, tuple[Call, Call]]:
     """Return the options whose cost is measured: calls with and without."""
     e, dry = load("e"), {"uplift": "none"}
     joint = Interface(condense(e, Bodies.of(e)), e["quadrature"])
-    filling = lambda *loading: lambda: LoadStepper(load("e", *loading), joint).run()
-    solving = lambda *loading: lambda: solve_timed(load("a", *loading))
-    writing = lambda *files: lambda: run(load("a"), folder, *files, False)
+
+    def filling(*loading: Any) -> Call:
+        return lambda: LoadStepper(load("e", *loading), joint).run()
+
+    def solving(*loading: Any) -> Call:
+        return lambda: solve_timed(load("a", *loading))
+
+    def writing(fields: bool, picture: bool) -> Call:
+        return lambda: run(load("a"), folder, fields, picture, False)
+
     return {
         "pressure unknowns (flow instead of none)": (filling({}, "9"), filling(dry, "9")),
         "load unknown (drive=heel instead of level)": (
@@ -216,7 +230,7 @@ def sweeps(measurements: Measurements) -> Table:
     return table
 
 
-def sweep_rows(name: str, case: Case, main: dict) -> tuple:
+def sweep_rows(name: str, case: Case, main: dict[str, Any]) -> tuple[Any, ...]:
     """Measure the rows of a sweep of a case; main: settings of its main scene."""
     strength = "sigma_max" if case["law"] == "rupture" else "mu"
     weaker = {strength: 0.9 * case[strength]}
@@ -227,9 +241,9 @@ def sweep_rows(name: str, case: Case, main: dict) -> tuple:
     ]
     first, further = (load(name, main, levels) for levels in ends)
     with threadpool_limits(1):
-        bulk, known, spent = condense(case, Bodies.of(case)), {}, []
+        bulk, known, spent = condense(case, Bodies.of(case)), Solved(), list[float]()
         joint = Interface(bulk, case["quadrature"])
-        runs = [partial(stepped, row, known, joint) for row in (first, further)]
+        runs: list[Call] = [partial(stepped, row, known, joint) for row in (first, further)]
         runs += [LoadStepper(load(name, main | s), joint).run for s in (weaker, stiffer)]
         for call in runs:
             start = time.perf_counter()
@@ -251,7 +265,7 @@ def joints(measurements: Measurements) -> Table:
     return table
 
 
-def measure_joints(number: int) -> tuple:
+def measure_joints(number: int) -> tuple[Any, ...]:
     """Measure a dam with a number of joints; returns the columns of `joints` but for the ratio."""
     lifts = {"lift_heights": tuple(45.0 * k / number for k in range(1, number))}
     case = load("dam", (lifts if number > 1 else {}) | {"uplift": "imposed"}, "30,40,45")
@@ -282,11 +296,16 @@ def stress(measurements: Measurements) -> Table:
             if (table.name, *values) not in measurements
         }
         for values in track(grid, "stress"):
-            table.add_measured(measurements, values, lambda v=values: ends[v].result())
+            table.add_measured(measurements, values, partial(of_grid, ends, values))
     return table
 
 
-def run_of_grid(law: str, aperture: float, stiffness: float, young: float) -> tuple:
+def of_grid(ends: Mapping[tuple[Any, ...], Future[Any]], values: tuple[Any, ...]) -> Any:
+    """The result of a combination of `stress`."""
+    return ends[values].result()
+
+
+def run_of_grid(law: str, aperture: float, stiffness: float, young: float) -> tuple[Any, ...]:
     """Run a combination of `stress`; how it ended, last level, iterations, cuts, seconds."""
     settings = {"aperture_min": aperture, "K_N": stiffness, "K_T": stiffness, "E": young}
     settings |= mesh_settings(2, 50, 1.0, "free", 2) | {"pena_tang": 0.1 * stiffness}

@@ -103,11 +103,16 @@ def hard(measurements: Measurements) -> Table:
         if scene.case["dim"] == 2:
             scenes[f"random {SEED}-{number}"] = partial(getattr, scene, "case")
     for name, of in track(scenes.items(), "hard scenes"):
-        table.add_measured(measurements, (name,), lambda of=of: measure(of()))
+        table.add_measured(measurements, (name,), partial(measure_of, of))
     return table
 
 
-def measure(case: Case) -> tuple:
+def measure_of(case: Callable[[], Case]) -> tuple[Any, ...]:
+    """`measure` a case that is loaded then."""
+    return measure(case())
+
+
+def measure(case: Case) -> tuple[Any, ...]:
     """Measure a scene; returns the columns of `hard` but for the first."""
     with threadpool_limits(1), clock() as measured:
         stepper = LoadStepper(case, interface_of(case))

@@ -8,6 +8,7 @@ from collections import Counter
 from functools import partial
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from damjoint.input.case import Case
@@ -75,8 +76,8 @@ def draw(table: Table, path: Path) -> None:
     for row in panels:
         shown |= dict(zip(*reversed(row[-1].get_legend_handles_labels()), strict=True))
     shown["efficient front"] = shown.pop("efficient front")  # last
-    style = {"loc": "outside lower center", "ncols": 4, "fontsize": 10, "frameon": False}
-    figure.legend(shown.values(), shown.keys(), **style)
+    below: dict[str, Any] = {"loc": "outside lower center", "ncols": 4}
+    figure.legend(list(shown.values()), list(shown), fontsize=10, frameon=False, **below)
     figure.savefig(path, dpi=130)
 
 
@@ -84,7 +85,7 @@ def front(seconds: np.ndarray, error: np.ndarray, gain: float = 1.0) -> np.ndarr
     """Return the indices of the efficient points by time: each has less than `gain` times the error
     of all faster ones.
     """
-    chosen = []
+    chosen = list[int]()
     for i in np.argsort(seconds):
         if not chosen or error[i] < gain * error[chosen[-1]]:
             chosen.append(i)
@@ -144,7 +145,7 @@ def modelings(measurements: Measurements, cases: Table) -> Table:
     columns = "shows", "rows", "worst difference", "seconds", "published code", "times faster"
     table = Table("modelings", "case", *columns)
 
-    def measure(row: int, case: Case) -> tuple:
+    def measure(row: int, case: Case) -> tuple[Any, ...]:
         with tempfile.TemporaryDirectory() as folder:
             results = run(case, Path(folder), False, False, False)
         rows = [c for result in results for c in validation.compare(result)]
@@ -347,7 +348,10 @@ def of_joints(table: Table) -> list[str]:
 def of_quakes(table: Table) -> list[str]:
     """Time steps of an earthquake."""
     both = [i for i, by_getdp in enumerate(table["GetDP: ms a step"]) if by_getdp != ""]
-    numbers = lambda name: [table[name][i] for i in both]
+
+    def numbers(name: str) -> list[float]:
+        return [table[name][i] for i in both]
+
     times = numbers("ms a step"), numbers("GetDP: ms a step")
     text = (
         f"A time step takes {min(times[0]):.1f} to {max(times[0]):.1f} ms, the set-up up to "
@@ -419,10 +423,10 @@ def bench(out: Path, short: bool) -> None:
 def measure(measurements: Measurements) -> tuple[dict[str, Table], list[str]]:
     """Measure all tables, {name: table}, and the errors of balances."""
     tables = [cases := bench_cost.cases(measurements)]
-    studies = bench_cost.switches, bench_cost.sweeps, bench_cost.growth, bench_cost.stress
-    studies += bench_commands.start, bench_commands.pictures, bench_commands.critical
-    studies += bench_commands.orders, bench_cost.engines, bench_cost.joints, bench_commands.quakes
-    studies += (bench_hard.hard,)
+    studies = [bench_cost.switches, bench_cost.sweeps, bench_cost.growth, bench_cost.stress]
+    studies += [bench_commands.start, bench_commands.pictures, bench_commands.critical]
+    studies += [bench_commands.orders, bench_cost.engines, bench_cost.joints]
+    studies += [bench_commands.quakes, bench_hard.hard]
     tables += [study(measurements) for study in studies]
     tables.append(modelings(measurements, cases))
     with threadpool_limits(1):

@@ -10,6 +10,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from damjoint import RunError
@@ -76,7 +77,7 @@ TABLES_ONLY = "--no-fields", "--no-picture"
 
 def run_cold(
     arguments: Sequence[str], options: Sequence[str] = TABLES_ONLY, cache: str = ""
-) -> tuple[float, dict]:
+) -> tuple[float, dict[str, Any]]:
     """Run a case in a new process, without a cache by default.
 
     Returns wall seconds and run.json, whose seconds are summed over the scenes of the case. Raises
@@ -144,7 +145,7 @@ def relative_errors(values: np.ndarray, exact: np.ndarray) -> np.ndarray:
 
 def mesh_settings(
     order: int, n: int, grading: float, pattern: str, dim: int, height: float = 10.0
-) -> dict:
+) -> dict[str, Any]:
     """Return the parameters of a mesh with n elements along the joint.
 
     grading: element sizes far from the joint, relative to those of --accuracy.

@@ -7,6 +7,7 @@ import csv
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from damjoint.storage import atomic_write
@@ -47,10 +48,10 @@ class Measurements:
             key, value = json.loads(line)
             self.values[json.dumps(key)] = value
 
-    def __contains__(self, key: tuple) -> bool:
+    def __contains__(self, key: tuple[Any, ...]) -> bool:
         return json.dumps(key) in self.values
 
-    def get(self, key: tuple, measure: Callable[[], object]) -> object:
+    def get(self, key: tuple[Any, ...], measure: Callable[[], object]) -> Any:
         """Return the value under a key, as JSON's types; measure it if it is not in the log."""
         name = json.dumps(key)
         if name not in self.values:
@@ -67,7 +68,7 @@ def to_json(value: object) -> object:
     return value.item() if isinstance(value, np.generic) else value
 
 
-class Table(dict):
+class Table(dict[str, list[Any]]):
     """Columns of a table, {name: values}, filled row by row."""
 
     def __init__(self, name: str, *columns: str) -> None:
@@ -80,7 +81,7 @@ class Table(dict):
             column.append(value)
 
     def add_measured(
-        self, measurements: Measurements, key: tuple, measure: Callable[[], Sequence]
+        self, measurements: Measurements, key: tuple[Any, ...], measure: Callable[[], Sequence[Any]]
     ) -> None:
         """Add a row: the key in the first columns, the measured values in the others."""
         self.add(*key, *measurements.get((self.name, *key), measure))

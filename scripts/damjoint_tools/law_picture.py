@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +63,7 @@ def draw(path: Path) -> None:
         curve = {"softening": softening} if softening else {}
         law = load("dam", {**MATERIAL, **curve, "law": law_name}).law
         opened = stresses(law, lambda size, _: (size, 0.0))
-        sheared = stresses(law, lambda size, before, law=law: pressed(law, size, before))
+        sheared = stresses(law, partial(pressed, law))
         mixed = stresses(law, lambda size, _: (size, size))
         # bond is below the others where they coincide
         style = {"lw": 4, "alpha": 0.5} if name == "bond" else {"lw": 1.5}

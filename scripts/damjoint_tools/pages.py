@@ -15,6 +15,7 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
+from damjoint.arrays import Values
 from damjoint.dynamics.frames import MOST_FRAMES
 from damjoint.input.parameters import declared
 from damjoint.laws import COLUMNS
@@ -29,7 +30,7 @@ from damjoint.model.results import (
     STEPS,
     THICKNESS,
 )
-from damjoint.post.validation import Comparison
+from damjoint.post.validation import Comparison, Reference
 from damjoint.statics.rigid_block import LOADS
 from damjoint.studies.check import CHECK
 from damjoint.studies.failure_path import CRITICAL
@@ -67,7 +68,7 @@ def parameters_page() -> str:
         "Default levels: two thirds and eight ninths of the height, and the crest. In the Gmsh "
         "window they are in the group Water levels.",
     ]
-    groups: dict[str, list[tuple]] = {}
+    groups: dict[str, list[tuple[object, ...]]] = {}
     for parameter in declared().values():
         notes = parameter.help if not parameter.automatic else ""
         groups.setdefault(parameter.group, []).append(
@@ -258,7 +259,7 @@ def quake_conventions(published: list[Comparison]) -> str:
     from damjoint.post.validation import compare_steps, last_time
     from damjoint.verification.quake_tests import follow, sdnv138
 
-    own = {}
+    own: dict[Reference, Comparison] = {}
     for name, test in sdnv138().items():
         test = replace(test, settings={**test.settings, **OWN_CONVENTIONS})
         columns = follow(test, last_time("sdnv138"))
@@ -335,7 +336,7 @@ of the mesh; the water line at 9 m cuts the longest of its ten sides. So do C_FI
 J_FILE (`face_points`), which gives the published digits. With the exact pressure (`--set
 face_points=0`), as everywhere else, the same meshes give the last columns."""
 #: Settings of SDNV138 by the conventions of this package.
-OWN_CONVENTIONS = {"face_points": 0.0, "time_integration": "HHT"}
+OWN_CONVENTIONS: Values = {"face_points": 0.0, "time_integration": "HHT"}
 QUAKES = """The same meshes, time steps and dashpots by the conventions of this package (the
 defaults of `face_points` and `time_integration`): exact pressure on the face, HHT of second order,
 dashpots at each Gauss point while it is closed. With water in the joint (B, C) the dam is at the

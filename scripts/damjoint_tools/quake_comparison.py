@@ -61,7 +61,7 @@ Checked: TypeAlias = tuple[dict[str, float], list[str]]
 
 def further_checks(scene: RandomQuake, run: Shaken, again: Again) -> Checked:
     """Return the numbers of all checks of a scene, and the rules that they violate."""
-    measures, found = {}, []
+    measures, found = dict[str, float](), list[str]()
     for check in scene.checks:
         numbers, violated = CHECK_BY_NAME[check](scene, run, again)
         measures |= numbers

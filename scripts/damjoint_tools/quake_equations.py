@@ -27,7 +27,10 @@ def joint_forces(quake: Earthquake, begin: Moving, end: Moving) -> Array:
     problem, jumps = quake.problem, quake.system.jumps
     equilibrium = problem.model.equilibrium
     interface, state = equilibrium.interface, end.state
-    at_points = lambda jump: interface.jumps(interface.at_points, jump)
+
+    def at_points(jump: Array) -> Array:
+        return interface.jumps(interface.at_points, jump)
+
     traction, _ = equilibrium.laws.evaluate(at_points(state.jump), state.variables)
     if not quake.published and end is not begin:
         closed = at_points(begin.state.jump)[:, :1] <= 0
@@ -75,7 +78,7 @@ def follow(quake: Earthquake) -> dict[str, float]:
         inertia = system.mass @ motion.acceleration
         residual = inertia + (1 + alpha) * (forces - load) - alpha * (forces_before - load_before)
         worst = max(worst, float(np.linalg.norm(residual)))
-        given += moved @ (load + load_before) / 2
+        given += float(moved @ (load + load_before)) / 2
         lost = moved @ (viscous + viscous_before) / 2
         on_joint = moved[jumps] @ (joint + joint_before) / 2
         kinetic = motion.velocity @ (system.mass @ motion.velocity) / 2

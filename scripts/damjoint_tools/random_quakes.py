@@ -11,6 +11,7 @@ from damjoint.input.case import Case
 
 from .random_scenes import (
     CURVE_DRAWS,
+    Drawn,
     RandomNumbers,
     RandomScene,
     joint,
@@ -118,7 +119,7 @@ def random_quake(seed: int, number: int, folder: Path) -> RandomQuake:
     return replace(drawn_scene, settings=settings)
 
 
-def quake_joint(rng: RandomNumbers) -> dict[str, float | str]:
+def quake_joint(rng: RandomNumbers) -> Drawn:
     """Draw law and strengths of a joint; most of them slide or rock in an earthquake."""
     drawn = joint(rng)
     while not 1e9 <= drawn["K_N"] <= 1e13:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar, TypeAlias, TypeVar
 
 import numpy as np
 from damjoint.arrays import Setting
@@ -11,6 +11,10 @@ from damjoint.input.case import Case
 from damjoint.input.parameters import declared
 from damjoint.input.resolve import load
 from damjoint.input.values import has_drains
+
+Choice = TypeVar("Choice")
+#: Settings by the name of the parameter.
+Drawn: TypeAlias = dict[str, Any]
 
 #: Third number of the seed of the lift joints, of temperature, works on the joint, waterstop, law =
 #: endo and variants of loads, of joints that meet, and of softening curves, which are drawn apart.
@@ -35,7 +39,7 @@ LOAD_TIMES = "silt_t", "ice_t", "force_t", "anchor_t", "quake_t"
 class RandomScene:
     """Random dam: parameters that differ from the default dam's, and levels as in the command."""
 
-    settings: dict[str, Setting]
+    settings: Drawn
     levels: str
     tail_levels: str
     steps: int
@@ -102,7 +106,7 @@ class RandomNumbers:
         """Draw a number whose logarithm is uniformly distributed."""
         return float(f"{np.exp(self.generator.uniform(np.log(low), np.log(high))):.3g}")
 
-    def choice(self, *choices: float | str) -> float | str:
+    def choice(self, *choices: Choice) -> Choice:
         """Draw one of the choices with equal probability."""
         return choices[self.generator.integers(len(choices))]
 
@@ -122,7 +126,7 @@ def random_scene(seed: int, number: int) -> RandomScene:
     return replace(scene, settings=settings)
 
 
-def with_curve(settings: dict[str, Setting], rng: RandomNumbers) -> dict[str, Setting]:
+def with_curve(settings: Drawn, rng: RandomNumbers) -> Drawn:
     """Settings, in some with exponential softening, which needs twice the fracture energy in shear;
     the curve is drawn from its own numbers, so that all else is what it was.
     """
@@ -166,7 +170,7 @@ def with_works(scene: RandomScene, rng: RandomNumbers) -> RandomScene:
     """Add to some scenes a change of temperature and variants of their loads; in some with a single
     joint the law endo, grouting or sawing, or a waterstop.
     """
-    settings, drawn = scene.settings, dict[str, Setting]()
+    settings, drawn = scene.settings, Drawn()
     if rng.event(0.25):
         stiffest = max(settings["E"], settings.get("E_found", 0))
         drawn |= temperature(rng, min(8.0, 8.0 * CONCRETE / stiffest))
@@ -193,9 +197,9 @@ def with_works(scene: RandomScene, rng: RandomNumbers) -> RandomScene:
     return replace(scene, settings=settings | drawn)
 
 
-def temperature(rng: RandomNumbers, most: float) -> dict[str, Setting]:
+def temperature(rng: RandomNumbers, most: float) -> Drawn:
     """Draw changes of temperature up to a size [K]."""
-    drawn = {
+    drawn: Drawn = {
         "temperature_dam": rng.uniform(-most, most),
         "temperature_linear": rng.choice(0, rng.uniform(-most, most)),
         "temperature_found": rng.choice(0, rng.uniform(-most / 2, most / 2)),
@@ -203,7 +207,7 @@ def temperature(rng: RandomNumbers, most: float) -> dict[str, Setting]:
     return drawn | ({"temperature_period": rng.uniform(1, 4)} if rng.event(0.3) else {})
 
 
-def endo(rng: RandomNumbers, settings: dict[str, Setting]) -> dict[str, Setting]:
+def endo(rng: RandomNumbers, settings: Drawn) -> Drawn:
     """Draw strengths of law = endo within its conditions."""
     mu, strength = settings["mu"], rng.log_uniform(3e3, 1e6)
     cohesion = float(f"{mu * strength * rng.uniform(1.05, 1.35):.4g}")
@@ -248,8 +252,8 @@ def single_joint_scene(seed: int, number: int) -> RandomScene:
     if not solid and rng.event(0.1):
         settings, tails = slender_dam(rng, height), [0.0]
         levels = sorted(rng.uniform(0.6 * height, height) for _ in levels)
-    water = (",".join(f"{level:g}" for level in heights) for heights in (levels, tails))
-    return RandomScene(settings, *water, steps)
+    reservoir, tailwater = (",".join(f"{h:g}" for h in heights) for heights in (levels, tails))
+    return RandomScene(settings, reservoir, tailwater, steps)
 
 
 def with_lifts(scene: RandomScene, rng: RandomNumbers) -> RandomScene:
@@ -284,7 +288,7 @@ def with_lifts(scene: RandomScene, rng: RandomNumbers) -> RandomScene:
     return replace(scene, settings=settings)
 
 
-def of_joints(drawn: list[dict[str, Setting]]) -> dict[str, Setting]:
+def of_joints(drawn: list[Drawn]) -> Drawn:
     """Return the settings of OF_JOINTS with a value for each joint, by default that of its
     declaration.
     """
@@ -293,7 +297,7 @@ def of_joints(drawn: list[dict[str, Setting]]) -> dict[str, Setting]:
     return {n: tuple(own.get(n, default[n]) for own in drawn) for n in names}
 
 
-def slender_dam(rng: RandomNumbers, height: float) -> dict[str, float | str]:
+def slender_dam(rng: RandomNumbers, height: float) -> Drawn:
     """Draw a slender dam of realistic stiffness on a joint that loses its shear stiffness on
     opening: under uplift its crack grows unstably.
     """
@@ -316,9 +320,13 @@ def slender_dam(rng: RandomNumbers, height: float) -> dict[str, float | str]:
     }
 
 
-def mesh(rng: RandomNumbers, height: float, solid: bool, plain: bool) -> dict[str, float | str]:
+def mesh(rng: RandomNumbers, height: float, solid: bool, plain: bool) -> Drawn:
     """Draw dimension and mesh; coarse, as equilibrium holds on any mesh."""
-    settings = {"dam_height": height, "order": rng.choice(1, 2), "n_joint": rng.choice(10, 20, 40)}
+    settings: Drawn = {
+        "dam_height": height,
+        "order": rng.choice(1, 2),
+        "n_joint": rng.choice(10, 20, 40),
+    }
     if not solid:
         settings["mesh_pattern"] = rng.choice("free", "regular") if plain else "free"
         return settings
@@ -334,10 +342,10 @@ def mesh(rng: RandomNumbers, height: float, solid: bool, plain: bool) -> dict[st
     }
 
 
-def section(rng: RandomNumbers, height: float, plain: bool) -> dict[str, float | str]:
+def section(rng: RandomNumbers, height: float, plain: bool) -> Drawn:
     """Draw outline and elasticity of the bodies."""
     base = rng.uniform(0.45 * height, 1.0 * height)
-    drawn = {
+    drawn: Drawn = {
         "dam_base": base,
         "dam_crest": rng.uniform(0.05 * base, 0.2 * base),
         "E": rng.log_uniform(1e9, 1e13),
@@ -361,9 +369,9 @@ def section(rng: RandomNumbers, height: float, plain: bool) -> dict[str, float |
     return drawn
 
 
-def joint(rng: RandomNumbers) -> dict[str, float | str]:
+def joint(rng: RandomNumbers) -> Drawn:
     """Draw law and strengths; fracture energies exceed the elastic energy at the strength."""
-    drawn = {
+    drawn: Drawn = {
         "law": rng.choice("rupture", "friction", "bond"),
         "K_N": rng.log_uniform(1e8, 1e15),
         "sigma_max": rng.choice(0, rng.log_uniform(1e3, 2e6)),
@@ -384,11 +392,11 @@ def joint(rng: RandomNumbers) -> dict[str, float | str]:
     return drawn
 
 
-def drains(rng: RandomNumbers, settings: dict[str, float | str]) -> dict[str, float | str]:
+def drains(rng: RandomNumbers, settings: Drawn) -> Drawn:
     """Draw whether there are drains where the water flows; position, effectiveness and outlet level
     of all drains.
     """
-    drawn = {"drains": 1} if settings["uplift"] == "flow" and rng.event(0.4) else {}
+    drawn: Drawn = {"drains": 1} if settings["uplift"] == "flow" and rng.event(0.4) else {}
     if not has_drains({"drains": 0} | settings | drawn) or rng.event(0.5):
         return drawn
     base, height = settings["dam_base"], settings["dam_height"]
@@ -399,9 +407,9 @@ def drains(rng: RandomNumbers, settings: dict[str, float | str]) -> dict[str, fl
     return drawn
 
 
-def loads(rng: RandomNumbers, height: float) -> dict[str, float | str]:
+def loads(rng: RandomNumbers, height: float) -> Drawn:
     """Draw loads besides weight and water, as shares of the thrust of the water."""
-    thrust, drawn = 1000 * 9.81 * height**2 / 2, {}
+    thrust, drawn = 1000 * 9.81 * height**2 / 2, Drawn()
     if rng.event(0.3):
         drawn["silt_height"] = rng.uniform(0.05 * height, 0.4 * height)
     if rng.event(0.2):

@@ -21,6 +21,7 @@ from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from damjoint import InputError, RunError
 from damjoint.processes import pool_of
@@ -65,7 +66,7 @@ def run_and_verify(scene: RandomScene, folder: Path, twice: bool = False) -> dic
     also with twice the steps, and its critical level.
     """
     start, case = time.perf_counter(), scene.case
-    row = {
+    row: dict[str, object] = {
         "command": " ".join(["damjoint", *scene.words]),
         "highest_level": max(case.levels),
         "joints": len(case.joints),
@@ -156,7 +157,7 @@ def with_further_checks(
         return run_of(changed, folder, *options, name=f"again_{next(runs)}").shaken
 
     measures, found = further_checks(scene, run.shaken, again)
-    numbers = {name: f"{value:.3g}" for name, value in measures.items()}
+    numbers: dict[str, object] = {name: f"{v:.3g}" for name, v in measures.items()}
     return numbers | {"class": DEFECT if found else VERIFIED, "findings": "; ".join(found)}
 
 
@@ -168,7 +169,7 @@ def computed_again(
     """
     if row["class"] == DEFECT:
         return {}
-    found, numbers = [], {}
+    found, numbers = list[object](), dict[str, Any]()
     if row["class"] == VERIFIED:
         doubled = run_of(replace(scene, steps=2 * scene.steps), folder, name="doubled").files
         found += again.other_steps(run.asked, run.files, doubled)
@@ -271,9 +272,9 @@ def stress(
     names = [f"{seed}-{number}" for number in range(count)]
     about = {"stress": {"rows": count, "seed": seed, "quake": quake}}
     with rows_session("stress", out, COLUMNS, ("dim", "seconds"), about) as (study, done):
-        for row in done.values():
-            if row["code"] != now["code"]:
-                other = f"damjoint {row['version']} ({row['commit'] or row['date']})"
+        for before in done.values():
+            if before["code"] != now["code"]:
+                other = f"damjoint {before['version']} ({before['commit'] or before['date']})"
                 raise InputError(
                     f"out = {out}: must be a new file; this file has rows of {other}, other code"
                 )

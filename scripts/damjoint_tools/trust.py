@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -252,7 +253,7 @@ def classes(rows: list[Row], *names: str, with_words: dict[str, str] | None = No
     """Return the table of the scenes of each class, by the values of columns (no lists), and by
     parts of the command.
     """
-    lines: list[tuple] = []
+    lines: list[tuple[Any, ...]] = []
     for name in names:
         values = sorted({row[name] for row in rows if "," not in row[name]})
         for value in values:
@@ -267,8 +268,13 @@ def classes(rows: list[Row], *names: str, with_words: dict[str, str] | None = No
 
 def measured(rows: list[Row]) -> str:
     """Return the table of the numbers of the further checks."""
-    conserves = lambda row: "hht_alpha=0 " in row["command"]
-    frictional = lambda row: "rupture" not in row["law"]
+
+    def conserves(row: Row) -> bool:
+        return "hht_alpha=0 " in row["command"]
+
+    def frictional(row: Row) -> bool:
+        return "rupture" not in row["law"]
+
     parts = {
         "energy_lost": ((", alpha = 0", conserves), (", others", lambda row: not conserves(row))),
         "change_by_dt": (
@@ -276,7 +282,7 @@ def measured(rows: list[Row]) -> str:
             (", with a joint of law = rupture", lambda row: not frictional(row)),
         ),
     }
-    lines: list[tuple] = []
+    lines: list[tuple[Any, ...]] = []
     for name, meaning in MEASURES.items():
         for words, chosen in parts.get(name, (("", lambda row: True),)):
             own = [row for row in rows if row.get(name) and chosen(row)]
