@@ -64,7 +64,7 @@ if TYPE_CHECKING:
     from .library import case as case
     from .library import check as check
     from .library import critical as critical
-    from .library import fill as fill
+    from .library import load_steps as load_steps
     from .library import modes as modes
     from .library import quake as quake
     from .library import reliability as reliability
@@ -108,7 +108,7 @@ def data(folder: str) -> Path:
 
 #: What `import damjoint` offers, see library/; imported when it is used.
 LIBRARY = (
-    *("case", "run", "fill", "check", "critical", "quake", "modes", "sweep"),
+    *("case", "run", "load_steps", "check", "critical", "quake", "modes", "sweep"),
     *("reliability", "calibrate"),
     *("Case", "Run", "JointTable", "Step", "Checks", "Critical", "Quake", "Modes", "Sample"),
     *("Sweep", "Reliability", "sensitivity"),
@@ -118,6 +118,11 @@ __all__ = [*LIBRARY, "InputError", "RunError"]
 
 
 def __getattr__(name: str) -> Any:
+    if name == "fill":  # until the next version
+        import warnings
+
+        warnings.warn("dj.fill is called dj.load_steps now", DeprecationWarning, stacklevel=2)
+        name = "load_steps"
     if name in LIBRARY:
         from importlib import import_module
 

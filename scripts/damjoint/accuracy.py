@@ -22,7 +22,6 @@ from .input.case import Case
 from .input.refinement import has_plane_fields
 from .model.results import Results
 from .statics import process_zone
-from .statics.notes import remarks
 from .statics.verdict import stiffness_ratio
 
 #: Parameters that set the mesh, besides the sizes h_dam and h_found, which follow.
@@ -116,16 +115,8 @@ def solve(case: Case, engine: Engine, on_step: OnStep, fields: bool) -> Iterator
     """Yield the outcomes of a case's scenes, each on the mesh that the case's accuracy requires; on
     the case's own mesh if it requires none.
 
-    Adds `notes` and `error_estimate` to the content of run.json. Raises RunError.
+    Adds `error_estimate` to the content of run.json. Raises RunError.
     """
-    known = {"notes": remarks(case)}
-    for outcome in solve_scenes(case, engine, on_step, fields):
-        outcome.result.info |= known
-        yield outcome
-
-
-def solve_scenes(case: Case, engine: Engine, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
-    """See `solve`."""
     if not case.accuracy:
         yield from engine.solve(case, on_step, fields)
         return

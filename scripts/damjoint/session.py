@@ -10,7 +10,7 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from . import versions
 from .fem.memory import seconds, sizes
@@ -18,8 +18,12 @@ from .input.case import Case
 from .model.results import Results
 from .post import folder as folders
 from .post import tables
+from .processes import in_processes
 from .progress import INTERVAL, Progress
 from .statics.notes import remarks
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 
 def end_of(error: BaseException | None, where: str = "") -> tuple[str, str]:
@@ -149,17 +153,29 @@ def finished(out: Path, key: str) -> bool:
     return (folders.read_info(out) or {}).get("key") == key
 
 
-@contextlib.contextmanager
-def several(cases: Mapping[Path, Case]) -> Iterator[None]:
-    """Compute studies of several cases, by their folders, some in other processes: if the block
-    ends early, those that were running have ended, too.
+def several(
+    work: Callable[[Item, bool], Result],
+    items: Mapping[Path, Item],
+    out: Path,
+    jobs: int | None,
+    title: str,
+) -> Iterator[list[Result]]:
+    """Compute studies of several cases, by their folders below out, in `jobs` processes; yields the
+    results so far, in their order. Those that are running when one ends early have ended, too.
+
+    work: computes an item, see `in_processes`. Raises InputError, RunError.
     """
-    try:
-        yield
-    except BaseException as error:
-        state, _ = end_of(error)
-        for out, case in cases.items():
-            if (folders.read_info(out) or {}).get("state") == "running":
-                record = out / folders.RECORD
-                folders.write_state(case.name, record, state, "ended before its first result")
-        raise
+    done = dict[int, Result]()
+    with folders.claim_study_folder(out):
+        try:
+            for number, result in in_processes(work, [*items.values()], jobs, title):
+                done[number] = result
+                yield [done[k] for k in sorted(done)]
+        except BaseException as error:
+            state, _ = end_of(error)
+            for folder in items:
+                info = folders.read_info(folder) or {}
+                if info.get("state") == "running":
+                    record, why = folder / folders.RECORD, "ended before its first result"
+                    folders.write_state(info["case"], record, state, why)
+            raise

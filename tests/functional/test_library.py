@@ -289,7 +289,7 @@ def test_bad_input_is_one_line():
 
 
 def test_steps_are_the_rows_of_the_history(run):
-    steps = list(dj.fill(dj.case("dam", **CASE)))
+    steps = list(dj.load_steps(dj.case("dam", **CASE)))
     assert [step.level for step in steps] == list(run.history.level)
     for name in ("N", "T", "M", "crack_length", "crest_ux"):
         rows = [step.row[name] for step in steps]
@@ -310,7 +310,7 @@ def test_steps_are_computed_in_one_thread_and_the_loop_over_them_is_not_limited(
 
     monkeypatch.setattr(LoadStepper, "steps", watched)
     with limited_threads(2):
-        assert all(threads() == {2} for _ in dj.fill(dj.case("dam", **CASE)))
+        assert all(threads() == {2} for _ in dj.load_steps(dj.case("dam", **CASE)))
     assert during == {1}
 
 

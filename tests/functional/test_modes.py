@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from damjoint.dynamics import modes
 from damjoint.input.resolve import load
+from damjoint.pictures import modes_picture
 from damjoint.pictures.drawing import CONCRETE, ROCK
 from damjoint.post import stored
 from damjoint.studies import modes_study
@@ -96,7 +97,7 @@ def test_the_command_writes_rows_picture_and_run_json(command, tmp_path):
 
 def test_the_picture_shows_the_whole_dam_and_the_rock_around_it_in_their_colors():
     case = load("dam", {"n_joint": 4, "order": 1, "h_found": 40}, "40")
-    axes = modes_study.figure(modes_study.compute(case, 1)).axes[0]
+    axes = modes_picture.figure(modes_study.compute(case, 1), "modes").axes[0]
     (cells,) = axes.collections
     colors = {to_hex(color) for color in cells.get_facecolor()}
     assert colors == {ROCK, CONCRETE}
@@ -123,7 +124,7 @@ def test_a_report_on_modes_is_refused(command, tmp_path):
 
 
 @pytest.mark.heavy
-def test_modes_in_3d_and_of_several_joints(command, tmp_path):
+def test_modes_in_3d_and_of_several_joints(command, tmp_path, texts_drawn):
     """Held along z, an extruded section has those of the plane; free, a first one along z, of which
     no mass moves along x and y. A picture is drawn of lift joints and in 3D.
     """
@@ -137,4 +138,6 @@ def test_modes_in_3d_and_of_several_joints(command, tmp_path):
     settings = [word for name, v in coarse.items() for word in ("--set", f"{name}={v}")]
     for words in (("lifts",), ("dam", "--set", "dim=3", "--set", "thickness=5")):
         assert command("modes", *words, *settings, "--out", words[0])[0] == 0
-        assert (tmp_path / words[0] / f"{words[0]}_modes.png").stat().st_size > 10_000
+        rows = json.loads((tmp_path / words[0] / "run.json").read_text())["modes"]
+        first = f"mode 1: {rows['frequency'][0]:.3g} Hz"
+        assert any(text.startswith(first) for text in texts_drawn.pop())

@@ -169,7 +169,7 @@ def test_a_scene_in_other_consistent_units_has_the_same_results(tmp_path, scene,
         runner.run(c, tmp_path, fields=False, picture=False, progress=False, engine=engine)[0]
         for c in (case, other)
     )
-    assert one.last["slip_length"] > 0 or one.last["process_zone"] > 0
+    assert one.last["slip_length"] + one.last["process_zone"] > 0  # the joint is damaged
     for a, b in ((one.joint, two.joint), (one.history, two.history)):
         wanted = {n: scaled.get(n, lambda v: v)(v) for n, v in a.items() if n not in COUNTS}
         assert not {n: off for n, off in differences(wanted, b).items() if off > 1e-10}

@@ -181,11 +181,11 @@ def test_what_the_model_can_not_compute_is_one_line(command, case_file, options,
 def test_what_a_run_leaves_out_is_said_before_it(case_file, tmp_path):
     """The picture; and that an interrupted run starts again."""
     case = load(str(case_file))
-    assert list(quake_getdp.left_out(tmp_path, False)) == []
-    (picture,) = quake_getdp.left_out(tmp_path, True)
+    assert list(quake_getdp.omitted_files(tmp_path, False)) == []
+    (picture,) = quake_getdp.omitted_files(tmp_path, True)
     assert "--engine getdp draws no picture" in picture
     folder.write_state(case.name, tmp_path / "out" / folder.RECORD, "interrupted")
-    again, _ = quake_getdp.left_out(tmp_path / "out", True)
+    again, _ = quake_getdp.omitted_files(tmp_path / "out", True)
     assert again.endswith("--engine getdp starts an interrupted earthquake again")
 
 

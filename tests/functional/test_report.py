@@ -15,10 +15,11 @@ import numpy as np
 import pytest
 from damjoint import cli, runner
 from damjoint.input.resolve import load
+from damjoint.pictures import report_picture
 from damjoint.pictures.run_picture import shear_limit
 from damjoint.post import stored
 from damjoint.statics import gravity
-from damjoint.studies import body_stress, report, report_input, report_picture
+from damjoint.studies import body_stress, report, report_input
 from damjoint.studies.check import compare_joints
 from numpy.testing import assert_allclose
 from PIL import Image

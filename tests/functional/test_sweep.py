@@ -155,12 +155,13 @@ def test_a_scheduler_with_two_workers(tmp_path, monkeypatch):
 
     monkeypatch.setattr(sweep, "TASKS_PER_THREAD", 1)
     plan = plan_of(["mu=0.35,0.36,0.38,0.4", "level=8,9"], [], None, {})
+    planned = sweep.PlannedRows(load("c"), plan)
     with LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
     ) as cluster:
         address = cluster.scheduler_address
-        far = sweep.sweep(load("c"), plan, tmp_path / "far.csv", scheduler=address)
-    near = sweep.sweep(load("c"), plan, tmp_path / "near.csv", jobs=1)
+        far = sweep.sweep(planned, tmp_path / "far.csv", scheduler=address)
+    near = sweep.sweep(planned, tmp_path / "near.csv", jobs=1)
     assert far[0] == near[0] == len(far[1]) == len(near[1]) == 8
     by_key = lambda name: {row["key"]: row for row in rows(tmp_path / name)}
     far, near = by_key("far.csv"), by_key("near.csv")

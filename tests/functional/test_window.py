@@ -899,7 +899,7 @@ def test_graphs_do_not_overlap_and_are_fewer_where_it_is_narrow(size):
     width, height = layout.graph_size
     boxes = []
     for number in range(layout.most_graphs):
-        x, y = layout.graph_place(number)
+        x, y = layout.graph_position(number)
         left = layout.width + x
         boxes.append((left - BESIDE_AXES, left + width, y - ABOVE_AXES, y + height + BELOW_AXES))
         assert boxes[-1][0] >= layout.scene_width and boxes[-1][1] <= layout.width

@@ -63,7 +63,7 @@ def call(arguments: argparse.Namespace) -> int:
     for case in cases:
         check(case, options)
     if arguments.engine == "getdp":
-        for line in quake_getdp.left_out(out, picture):
+        for line in quake_getdp.omitted_files(out, picture):
             say(f"damjoint: {line}", file=sys.stderr)
     results = run_records(cases, out, options, arguments.jobs)
     for result in results:

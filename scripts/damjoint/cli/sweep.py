@@ -86,8 +86,8 @@ def add(command: Parser) -> None:
 def call(arguments: argparse.Namespace) -> int:
     """Run damjoint sweep."""
     from ..input import parameters
-    from ..studies.plan import cases_of, plan_of, sample_of
-    from ..studies.sweep import meshed, rows_table, sweep
+    from ..studies.plan import plan_of, sample_of
+    from ..studies.sweep import PlannedRows, meshed, rows_table, sweep
 
     out = arguments.out or Path(f"{Path(arguments.case).stem}_sweep.csv")
     settings = parameters.settings(arguments.settings)
@@ -102,12 +102,11 @@ def call(arguments: argparse.Namespace) -> int:
         case, estimate = meshed(case)
         say(f"mesh of all rows, refined for the unchanged case: {estimate}")
     on_note = partial(print_note, case)
-    count, rows = sweep(case, plan, out, arguments.jobs, arguments.scheduler, on_note)
+    planned = PlannedRows(case, plan)
+    count, rows = sweep(planned, out, arguments.jobs, arguments.scheduler, on_note)
     say(f"{count} rows computed; {out}\n")
     say(f"{rows_table(plan, rows, table_width(arguments))}\n")
-    loaded = () if plan.sampled else cases_of(case, plan)
-    cases = [row_case for _, row_case in loaded]
-    report_sweep(case, plan, rows, cases, out)
+    report_sweep(case, plan, rows, [] if plan.sampled else planned.cases, out)
     return 0
 
 

@@ -107,7 +107,7 @@ class Graphs:
         """
         if self.count >= self.layout.most_graphs:
             return
-        x, y = self.layout.graph_place(self.count)
+        x, y = self.layout.graph_position(self.count)
         self.count += 1
         across = np.concatenate([curve.x for curve in curves])
         along_x = Scale.of(across, x_axis[1])

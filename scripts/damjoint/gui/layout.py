@@ -84,7 +84,7 @@ class Layout:
         """Width and height of a graph's axes."""
         return COLUMN - BESIDE_AXES - BEYOND_AXES, self.pitch - ABOVE_AXES - BELOW_AXES
 
-    def graph_place(self, number: int) -> tuple[float, float]:
+    def graph_position(self, number: int) -> tuple[float, float]:
         """Top left corner of a graph's axes: x from the right edge (< 0), y from the top."""
         row, column = divmod(number, max(self.columns, 1))
         x = -COLUMN * (self.columns - column) + BESIDE_AXES

@@ -15,6 +15,7 @@ from ..model.results import HISTORY, QUAKE, Results, column_of
 from ..post.summary import SHOWN, Table, levels_table, requested_rows, table_of
 from ..statics import gravity
 from ..statics.hints import hints
+from ..statics.notes import remarks
 from ..statics.statement import path_statement
 from ..studies.quake_result import QuakeResult
 from ..studies.quake_summary import row_of_peak
@@ -212,5 +213,5 @@ def warnings(result: Results) -> list[str]:
     """
     path = [path_statement(result)] if result.case["drive"] != "level" else []
     accuracy = result.info.get("error_estimate", {}).get("statement")
-    notes = result.info.get("notes", [])
+    notes = result.info["notes"] if "notes" in result.info else remarks(result.case)
     return [*path, *hints(result), *([accuracy] if accuracy else []), *notes]

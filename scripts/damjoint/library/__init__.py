@@ -28,7 +28,7 @@ from .quakes import modes as modes
 from .quakes import quake as quake
 from .runs import Run as Run
 from .runs import Step as Step
-from .runs import fill as fill
+from .runs import load_steps as load_steps
 from .runs import run as run
 from .sweeps import Sweep as Sweep
 from .sweeps import sweep as sweep

@@ -188,9 +188,10 @@ class Modes(WithTables):
 
     def plot(self) -> Figure:
         """The picture of the modes, as `damjoint modes` writes it."""
-        from ..studies.modes_study import figure
+        from ..pictures.modes_picture import figure
+        from ..studies.modes_study import about
 
-        return displayed(figure(self.natural))
+        return displayed(figure(self.natural, about(self.natural)))
 
     def __repr__(self) -> str:
         listed = ", ".join(f"{frequency:.4g}" for frequency in self.frequencies)

@@ -170,10 +170,10 @@ def run(source: Case | str | Path, *, engine: str = "auto") -> Run:
 
 @dataclass(frozen=True, repr=False)
 class Step:
-    """A converged step of `fill`.
+    """A converged step of `load_steps`.
 
     Example:
-        >>> step = next(fill(case("dam", levels=30, n_joint=10)))
+        >>> step = next(load_steps(case("dam", levels=30, n_joint=10)))
         >>> step, round(step.row["N"] / 1e6, 1)
         (t = 1, level 30 m, 15.7)
     """
@@ -197,7 +197,7 @@ class Step:
         return f"t = {self.time:g}, level {self.level:.6g} m"
 
 
-def fill(source: Case | str | Path) -> Iterator[Step]:
+def load_steps(source: Case | str | Path) -> Iterator[Step]:
     """Solve a case with the condensed engine and yield each converged step.
 
     The computation stops where the loop over the steps ends.
@@ -210,7 +210,7 @@ def fill(source: Case | str | Path) -> Iterator[Step]:
         RunError: a step could not be computed.
 
     Example:
-        >>> [step.level for step in fill(case("dam", levels=[30, 40], n_joint=10))]
+        >>> [step.level for step in load_steps(case("dam", levels=[30, 40], n_joint=10))]
         [30.0, 40.0]
     """
     case = noted(as_case(source), 3)

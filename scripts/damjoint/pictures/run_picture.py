@@ -135,10 +135,10 @@ def picture(solution: Solution, halves: tuple[int, ...] = (0, 1)) -> Figure:
     head = TITLE * len(title) + MESSAGE * (len(facts) + len(message)) + 0.05
     heights = [head]
     if has_states:
-        rows = len(result.joints) * PER_JOINT if several and not is_own_solid(case) else 0.0
+        rows = len(result.joints) * PER_JOINT if several and not is_user_solid(case) else 0.0
         middle = max(HEIGHT - head - HISTORY, rows)
         heights += [middle, max(HISTORY, several * (1 + len(result.joints)) * TABLE_ROW)]
-        if case["dim"] == 3 and solution.fields and not is_own_solid(case):
+        if case["dim"] == 3 and solution.fields and not is_user_solid(case):
             heights.append(SOLID)
     figure = figure_of(WIDTH, sum(heights))
     top, *parts = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
@@ -215,7 +215,7 @@ def draw_joint(figure: AnyFigure, solution: Solution, time: float) -> None:
     """Draw the only joint of a solution: curves along it, or maps where it is a surface of any
     shape (without fields its mesh is not known).
     """
-    if solution.fields and is_own_solid(solution.result.case):
+    if solution.fields and is_user_solid(solution.result.case):
         draw_maps(figure, solution, time)
     else:
         axes = panels(figure, 3, 1, bottom=0.62, top=0.28, down=0.32)[:, 0]
@@ -230,7 +230,7 @@ def draw_all_joints(figure: AnyFigure, solution: Solution, time: float) -> None:
     joints = solution.result.joints
     if len(joints) == 1:
         draw_joint(figure, solution, time)
-    elif solution.fields and is_own_solid(solution.result.case):
+    elif solution.fields and is_user_solid(solution.result.case):
         draw_openings(figure, solution, time)
     else:
         grid = panels(
@@ -541,14 +541,14 @@ def joint_length(result: Results) -> float:
     return float(distance(result.joint).max())
 
 
-def is_own_solid(case: Case) -> bool:
+def is_user_solid(case: Case) -> bool:
     """Whether the geometry is a user's own in 3D: one section does not represent it."""
     return case["dim"] == 3 and case.geometry is not None
 
 
 def draw_dam(figure: AnyFigure, solution: Solution, time: float) -> None:
     """Draw the section, or a 3D view if one section does not represent the geometry."""
-    draw = draw_view if is_own_solid(solution.result.case) else draw_section
+    draw = draw_view if is_user_solid(solution.result.case) else draw_section
     draw(figure, solution, time)
 
 

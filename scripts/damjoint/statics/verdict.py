@@ -249,12 +249,21 @@ def highest_by_statics(case: Case, last: dict[str, float]) -> tuple[float, str, 
         for k, joint in enumerate(case.joints)
         if case.separates((k,))
     )
-    return min(bounds, default=(np.inf, "", "", ""))
+    level, mode, joint = min(bounds, default=(np.inf, "", ""))
+    return level, mode, REASONS[mode], joint
 
 
-def highest_on_joint(case: Case, last: dict[str, float]) -> tuple[float, str, str]:
-    """The level [m] above which no equilibrium of a case's only joint exists, see
-    `highest_by_statics`.
+#: Why there is no equilibrium above the highest level, by how the dam fails there.
+REASONS = {
+    "": "",
+    "overturning": "the resultant leaves the joint",
+    "sliding": "the shear exceeds the strength of the joint",
+}
+
+
+def highest_on_joint(case: Case, last: dict[str, float]) -> tuple[float, str]:
+    """The level [m] above which no equilibrium of a case's only joint exists, and how the dam fails
+    there, see `highest_by_statics`.
 
     Whatever the distribution of stress: with the tensile strength f over the length l that is not
     cracked, M >= -f l^2/2, and the shear is at most the law's `shear_bound`; the crack does not
@@ -264,7 +273,7 @@ def highest_on_joint(case: Case, last: dict[str, float]) -> tuple[float, str, st
 
     law, time = case.law, min(last["time"], case.times[-1])
     if case.geometry or case["uplift"] == "flow" or freezes_uplift(case):
-        return np.inf, "", ""
+        return np.inf, ""
     crack = 0.0 if law.open_tension else last["crack_length"]
 
     def block(level: float) -> gravity.GravityMethod:
@@ -280,16 +289,12 @@ def highest_on_joint(case: Case, last: dict[str, float]) -> tuple[float, str, st
         state = block(level)
         return float(law.shear_bound(np.array(state.N), length)) - state.T
 
-    reasons = (
-        (moment, "overturning", "the resultant leaves the joint"),
-        (shear, "sliding", "the shear exceeds the strength of the joint"),
-    )
-    bounds = [(np.inf, "", "")]
+    bounds = [(np.inf, "")]
     if abs(at_last.M - last["M"]) < SAME_CRACK * abs(at_last.N) * case.joint_along:
-        for reserve, mode, words in reasons:
+        for reserve, mode in ((moment, "overturning"), (shear, "sliding")):
             if reserve(last["level"]) > 0 > reserve(case.highest_level):
                 root = brentq(reserve, last["level"], case.highest_level)
-                bounds.append((root, mode, words))
+                bounds.append((root, mode))
     return min(bounds)
 
 

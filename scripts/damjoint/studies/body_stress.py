@@ -17,7 +17,7 @@ from ..mesh.body import Body
 from ..model.fields import Solution, along
 from ..pictures.drawing import GREY, panels
 from ..pictures.outline import Section, joint_lines, section_of, skin
-from ..pictures.run_picture import is_own_solid
+from ..pictures.run_picture import is_user_solid
 from ..post.summary import Table, table_of
 from ..units import STRESSES, Units
 from .check import SafetyCheck
@@ -146,7 +146,7 @@ def on_face(points: list[FacePoint], middles: Array, stress: Array) -> tuple[Arr
 def undeformed(solution: Solution, time: float) -> Section | None:
     """The section of the mesh, undeformed; None if a section does not represent the geometry."""
     result, field = solution.result, solution.fields[time]
-    if is_own_solid(result.case):
+    if is_user_solid(result.case):
         return None
     lines = joint_lines(result.case, [joint.at(time) for joint in result.joints])
     return section_of(solution.bodies, field.displacement, 0.0, lines)

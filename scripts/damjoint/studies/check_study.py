@@ -15,7 +15,6 @@ from ..pictures.check_picture import Content, draw_check
 from ..post import folder as folders
 from ..post import stored
 from ..post.tables import write_csv
-from ..processes import in_processes
 from ..runner import run
 from ..session import finished, several
 from ..statics.gravity import GravityMethod
@@ -36,14 +35,12 @@ def check_cases(cases: list[Case], out: Path, jobs: int | None = None) -> list[S
         if names.count(case.name) > 1:
             raise InputError(f"case {case.name}: must be given once, and have its own name")
         engine_of(case, "auto")
-    tasks, done = [(case, out / case.name) for case in cases], dict[int, list[SafetyCheck]]()
-    by_folder = {folder: case for case, folder in tasks}
-    with folders.claim_study_folder(out), several(by_folder):
-        for number, checks in in_processes(check_case, tasks, jobs, "check"):
-            done[number] = checks
-            rows = [row for k in sorted(done) for check in done[k] for row in check.rows]
-            write_csv(out / folders.CHECK, {name: [row[name] for row in rows] for name in CHECK})
-    return [check for k in sorted(done) for check in done[k]]
+    tasks, checks = {out / case.name: (case, out / case.name) for case in cases}, []
+    for of_cases in several(check_case, tasks, out, jobs, "check"):
+        checks = [check for of_case in of_cases for check in of_case]
+        rows = [row for check in checks for row in check.rows]
+        write_csv(out / folders.CHECK, {name: [row[name] for row in rows] for name in CHECK})
+    return checks
 
 
 def check_case(task: tuple[Case, Path], progress: bool) -> list[SafetyCheck]:

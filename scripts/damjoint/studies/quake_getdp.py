@@ -22,7 +22,7 @@ from . import quake, quake_summary
 from .quake_result import QuakeTables
 
 
-def left_out(out: Path, picture: bool) -> Iterator[str]:
+def omitted_files(out: Path, picture: bool) -> Iterator[str]:
     """Yield what a run into a folder does not do, in words; picture: whether one is wanted."""
     info = folders.read_info(out)
     if info and info.get("state") in ("interrupted", "running"):

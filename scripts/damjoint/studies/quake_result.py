@@ -16,7 +16,6 @@ from ..mesh.mesh import Mesh
 from ..model.fields import Field
 from ..model.results import QUAKE, QUAKE_OF_JOINTS, Results, column_of, quake_columns
 from ..post.summary import Table, aligned, fitted
-from ..statics.notes import remarks
 from . import quake_summary
 
 if TYPE_CHECKING:
@@ -52,7 +51,7 @@ class QuakeTables:
     ) -> Self:
         """The result with a summary; end: state and message of an early end."""
         state, words = end
-        static.info |= {"notes": remarks(case), "quake": summary}
+        static.info["quake"] = summary
         # a joint that has slipped everywhere is no failure here
         static.info["verdict"] = state or quake_summary.verdict(case, summary)
         return cls(

@@ -21,7 +21,6 @@ from ..post import folder as folders
 from ..post import tables
 from ..post.field_files import write_fields
 from ..post.summary import aligned, fitted
-from ..processes import in_processes
 from ..session import Session, finished, session, several
 from ..storage import atomic_write
 from . import quake, quake_getdp, quake_summary
@@ -163,17 +162,13 @@ def run_records(
     for case, name in zip(cases, names, strict=True):
         if names.count(name) > 1:
             raise InputError(f"record {case.record}: must be given once, and have its own name")
-    outs = [out / name for name in names]
-    tasks = [(case, out, options) for case, out in zip(cases, outs, strict=True)]
-    done: dict[int, Ended] = {}
-    with folders.claim_study_folder(out), several(dict(zip(outs, cases, strict=True))):
-        for number, result in in_processes(run_record, tasks, jobs, "quake"):
-            done[number] = result
-        rows = [done[k].row for k in range(len(cases))]
-        tables.write_csv(
-            out / folders.RECORDS, {name: [in_file(r[name]) for r in rows] for name in rows[0]}
-        )
-    return [done[k] for k in range(len(cases))]
+    tasks = {out / n: (case, out / n, options) for case, n in zip(cases, names, strict=True)}
+    for results in several(run_record, tasks, out, jobs, "quake"):
+        if len(results) == len(cases):
+            rows = [result.row for result in results]
+            columns = {name: [in_file(row[name]) for row in rows] for name in rows[0]}
+            tables.write_csv(out / folders.RECORDS, columns)
+    return results
 
 
 def run_record(task: tuple[Case, Path, Options], progress: bool) -> Ended:

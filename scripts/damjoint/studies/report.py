@@ -23,6 +23,7 @@ from ..model.fields import Solution
 from ..model.results import Results
 from ..pictures import run_picture
 from ..pictures.drawing import figure_of, picture_style
+from ..pictures.report_picture import Picture, bands, embedded
 from ..post import stored
 from ..post.summary import Table, joints_note, joints_table, levels_table, table_of
 from ..post.validation import shown_time
@@ -46,7 +47,6 @@ from .check import (
 )
 from .check_tables import SHOWN
 from .report_input import Entry, by_runs, in_table
-from .report_picture import Picture, bands, embedded
 
 #: Sizes of the pictures [inches]: half of the page's width; its width; its width, in 3D.
 HALF, WIDE, SOLID = (5.2, 4.9), (10.6, 2.1), (10.6, 4.4)
@@ -570,7 +570,7 @@ def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str,
         section = figure_of(*HALF)
         run_picture.draw_dam(section, solution, time)
         yield "half", f"Section and loads {at_level}, deformed.", section
-    maps = has_fields and run_picture.is_own_solid(result.case)
+    maps = has_fields and run_picture.is_user_solid(result.case)
     colors = "" if maps else " Red: broken; violet: softening; orange: slipped."
     rows = several and not maps
     changes = len(np.unique(result.history["level"])) > 1  # else a single point or line
@@ -583,7 +583,7 @@ def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str,
     yield place, f"Joint{'s' if several else ''} {at_level}.{colors}", joint
     if changes and not (rows and has_fields):
         yield "full", "", history_of(result, WIDE)
-    if result.case["dim"] == 3 and has_fields and not run_picture.is_own_solid(result.case):
+    if result.case["dim"] == 3 and has_fields and not run_picture.is_user_solid(result.case):
         solid = figure_of(*SOLID)
         run_picture.draw_solid(solid, solution, time)
         yield "full", "In 3D: deformed, and maps of the joint.", solid

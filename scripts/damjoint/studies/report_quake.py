@@ -16,11 +16,11 @@ from ..dynamics.record import STANDARD_GRAVITY, Record
 from ..input.case import Case
 from ..model.results import column_of
 from ..pictures.drawing import BLUE, DARK, ORANGE, figure_of, panels
+from ..pictures.report_picture import Picture, bands, embedded
 from ..post import stored
 from ..post.summary import Table, table_of
 from ..units import Units
 from . import quake_result, report_input
-from .report_picture import Picture, bands, embedded
 
 #: Size of the picture of the spectra [inches], and their periods [s].
 SPECTRUM = (10.6, 2.3)

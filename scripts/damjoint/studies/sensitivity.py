@@ -167,7 +167,7 @@ def draw_changes(
     listed: Sequence[Mapping[str, Value]], case: Case, level: float, folder: Path
 ) -> None:
     """Draw changes at a level into the folder of a study of a case."""
-    from . import sensitivity_picture as picture
+    from ..pictures import sensitivity_picture as picture
 
     title = f"{case.title}: change by one percent of a parameter, level {level:.6g} m"
     picture.draw(listed, title, folder / f"{case.name}{picture.ENDING}")

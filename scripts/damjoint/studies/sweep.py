@@ -285,11 +285,16 @@ class PlannedRows:
         self.numeric = [*history_columns(case), "failed"]
 
     @property
+    def cases(self) -> list[Case]:
+        """Their cases."""
+        return [task.case for _, _, task in self.planned]
+
+    @property
     def notes(self) -> list[str]:
         """The notes on rows that their case does not have, the first one on each parameter."""
         of_case, lines = notes_on_settings(self.case), dict[str, str]()
-        for _, _, task in self.planned:
-            for note in notes_on_settings(task.case):
+        for case in self.cases:
+            for note in notes_on_settings(case):
                 if note not in of_case:
                     lines.setdefault(note.split()[0], note)
         return list(lines.values())
@@ -340,23 +345,22 @@ def meshed(case: Case) -> tuple[Case, str]:
 
 
 def sweep(
-    case: Case,
-    plan: Plan,
+    rows: PlannedRows,
     out: Path,
     jobs: int | None = None,
     scheduler: str | None = None,
     on_note: Callable[[str], None] = lambda note: None,
 ) -> tuple[int, list[Row]]:
-    """Compute the rows of a plan that are missing in out (CSV); on_note: called with each note on
-    rows before.
+    """Compute the rows that are missing in out (CSV); on_note: called with each note on rows
+    before.
 
-    Returns their number, and all rows of the plan. Columns: key, the plan's names (level as
+    Returns their number, and all rows. Columns: key, the plan's names (level as
     level_requested), the columns of history.csv, of an earthquake, OUTCOME, the critical value.
     Each finished row is written at once, so that an interrupted sweep can be continued. Raises
     InputError, RunError.
     """
     check_jobs(jobs)
-    rows = PlannedRows(case, plan)
+    case, plan = rows.case, rows.plan
     values = {key: row for key, row, _ in rows.planned}
     columns = ["key", *map(column_of, plan.names), *rows.results]
     notes = [*remarks(case), *rows.notes]

@@ -19,7 +19,7 @@ from ...input.case import Case
 from ...input.parameters import constants, listing, start_gmsh
 from ...mesh.mesh import Mesh, mesh_of
 from .paths import values_of_paths
-from .process import macro_of_joint, own_lists, own_names, position_of_joint
+from .process import macro_of_joint, position_of_joint, user_lists, user_names
 from .solve import check
 
 #: Gmsh's names of entities by dimension.
@@ -73,7 +73,7 @@ def geo_text(name: str, geometry: Path, mesh: Mesh) -> str:
 def pro_text(case: Case, mesh: Mesh) -> str:
     """NAME.pro: position of the joints, and the problem definition."""
     inverse = turned_joints(*regions_of(mesh), mesh)
-    lists = "".join(listing(name, values) for name, values in own_lists(mesh).items())
+    lists = "".join(listing(name, values) for name, values in user_lists(mesh).items())
     joints = "".join(
         macro_of_joint(
             k, position_of_joint(mesh, k) + path + "side_of_normal = -1;\n" * (k in inverse)
@@ -87,7 +87,7 @@ def pro_text(case: Case, mesh: Mesh) -> str:
         + 'Include "../pro/units.pro";\n'
         + f'Include "{case.name}.case";\n'
         + rounded(lists)
-        + own_names(mesh)
+        + user_names(mesh)
         + rounded(joints)
         + 'Include "../pro/damjoint.pro";\n'
     )

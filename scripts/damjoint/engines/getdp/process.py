@@ -87,7 +87,7 @@ def environment(folder: Path, threads: int = 1) -> dict[str, str]:
     return {**SINGLE_PROCESS, **os.environ, **fixed}
 
 
-def own_lists(mesh: Mesh) -> dict[str, list[float]]:
+def user_lists(mesh: Mesh) -> dict[str, list[float]]:
     """The lists of pro/section.pro for a user's own geometry."""
     bodies, faces, heel = mesh.bodies, mesh.faces.values(), mesh.joints[0].heel
     length = area(heel) if mesh.dim == 3 else 1.0
@@ -117,7 +117,7 @@ def numbers(mesh: Mesh) -> dict[str, float]:
     return {name: float(b) for b, name in enumerate(reversed(mesh.solids))}
 
 
-def own_names(mesh: Mesh) -> str:
+def user_names(mesh: Mesh) -> str:
     """The list of pro/joints.pro with the names of the joints of a user's own geometry."""
     names = ",\n".join(quoted(joint.name) for joint in mesh.joints)
     return f"own_joint_names() = Str[{names}];\n"
@@ -174,11 +174,11 @@ def write_problem(
     of_joints = ""
     mesh = mesh if case.geometry else None
     if mesh:
-        lists |= own_lists(mesh)
+        lists |= user_lists(mesh)
     lists |= more_lists or {}
     if mesh or case.of_joints:
         paths = values_of_paths(mesh, case) if mesh else [""] * len(case.joints)
-        of_joints = "of_joints = 1;\n" + (own_names(mesh) if mesh else "")
+        of_joints = "of_joints = 1;\n" + (user_names(mesh) if mesh else "")
         for k, joint in enumerate(case.joints):
             position = position_of_joint(mesh, k) if mesh else ""
             of_joints += macro_of_joint(k, values_of_joint(joint) + position + paths[k])

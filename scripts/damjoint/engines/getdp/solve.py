@@ -38,7 +38,7 @@ def check(case: Case) -> None:
     if case.geometry:
         mesh = mesh_of(case)
         case = case.with_joints([joint.of_case for joint in mesh.joints])
-        check_own(mesh, case)
+        check_user_mesh(mesh, case)
     for joint in case.joints:
         check_joint(joint)
 
@@ -67,7 +67,7 @@ def check_joint(joint: Case) -> None:
         raise InputError("order = 2: must be 1 with engine = getdp and uplift = waterstop in 3D")
 
 
-def check_own(mesh: Mesh, case: Case) -> None:
+def check_user_mesh(mesh: Mesh, case: Case) -> None:
     """Raise InputError if this engine cannot run a user's own geometry."""
     shapes = {shape for solid in mesh.solids.values() for shape, _ in solid.cells}
     if mesh.dim == 3 and shapes != {"tetra"}:

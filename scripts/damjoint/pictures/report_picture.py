@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
-from ..pictures.drawing import runs_of
+from .drawing import runs_of
 
 #: Resolution of the rasterised parts of a picture.
 DPI = 160

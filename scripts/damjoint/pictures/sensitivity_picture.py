@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..arrays import Value
-from ..pictures.drawing import BLUE, ORANGE, figure_of, picture_style, write_picture
+from .drawing import BLUE, ORANGE, figure_of, picture_style, write_picture
 
 #: Parameters that are drawn at most, the first ones; inches of a bar, and of a result.
 MOST, BAR, PANEL = 12, 0.26, 2.6
