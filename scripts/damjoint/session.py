@@ -43,8 +43,8 @@ class Record:
         """name: of the case; notes: on it."""
         self.name, self.path, self.notes = name, path, notes
         self.begun = time.perf_counter()
-        #: whether it has the end of the study
-        self.ended = False
+        #: whether it has the end of the study; how far that has come, if it ends without a message
+        self.ended, self.reached = False, ""
 
     @property
     def seconds(self) -> float:
@@ -69,7 +69,7 @@ class Record:
         except BaseException as error:
             if not self.ended:
                 state, _ = end_of(error)
-                self.save_without_results(state, str(error) or "no step had converged")
+                self.save_without_results(state, str(error) or self.reached)
             raise
         finally:
             versions.commit()
@@ -82,6 +82,7 @@ class Session(Record):
         """key: of all that decides the results, see `finished`; empty: they are not used again."""
         super().__init__(case.name, out / folders.RECORD, remarks(case))
         self.case, self.out, self.key = case, out, key
+        self.reached = "no step had converged"
         #: saved scenes: results, state and statement
         self.saved: list[tuple[Results, str, str]] = []
 

@@ -221,7 +221,8 @@ def test_an_interrupt_says_what_is_saved(command, tmp_path, monkeypatch):
     assert len(rows(tmp_path / "mu.csv")) == 1
     assert not (tmp_path / "mu.png").exists()  # of the rows before
     record = json.loads((tmp_path / "mu_run.json").read_text())
-    assert record["state"] == "interrupted" and record["machine"] and record["wall_seconds"]
+    assert (record["state"], record["statement"]) == ("interrupted", "1 rows were added")
+    assert record["machine"] and record["wall_seconds"]
     monkeypatch.setattr(sweep, "last_rows", last_rows)
     for added in (1, 1):  # nothing is missing the second time: the record stays
         assert command(*WORDS, "--vary", "mu=0.5,0.6")[0] == 0

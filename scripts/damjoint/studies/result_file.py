@@ -160,6 +160,7 @@ class SavedRows(Record):
             self.ended = False
         self.file.add(cells)
         self.added += 1
+        self.reached = f"{self.added} rows were added"
 
 
 @contextlib.contextmanager
