@@ -18,7 +18,6 @@ from .input.case import Case
 from .model.results import Results
 from .post import folder as folders
 from .post import tables
-from .processes import in_processes
 from .progress import INTERVAL, Progress
 from .statics.notes import remarks
 
@@ -166,6 +165,8 @@ def several(
 
     work: computes an item, see `in_processes`. Raises InputError, RunError.
     """
+    from .processes import in_processes  # a run starts without it
+
     done = dict[int, Result]()
     with folders.claim_study_folder(out):
         try:
