@@ -27,7 +27,7 @@ COMMANDS = {
 #: The functions of Python that do.
 FUNCTIONS = {
     "run": lambda: dj.run("mine.case"),
-    "fill": lambda: list(dj.fill("mine.case")),
+    "load_steps": lambda: list(dj.load_steps("mine.case")),
     "check": lambda: dj.check(["mine.case"]),
     "critical": lambda: dj.critical("mine.case", "mu"),
     "sweep": lambda: dj.sweep("mine.case", mu=[0.8], jobs=1),
