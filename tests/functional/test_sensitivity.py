@@ -2,6 +2,7 @@
 
 import csv
 from dataclasses import replace
+from types import SimpleNamespace
 
 import damjoint as dj
 import numpy as np
@@ -167,3 +168,18 @@ def test_bad_input_is_one_line_and_writes_nothing(command, tmp_path, words, mess
     code, out, error = command(*words)
     assert code == 2 and not out and not list(tmp_path.iterdir())
     assert message in error and len(error.splitlines()) == 1
+
+
+def test_a_level_of_unstable_growth_has_no_derivative(monkeypatch):
+    """There the system of the last step is singular to round-off: any number would be printed."""
+    trace = SimpleNamespace(updates=[])
+    case = dj.case("dam", n_joint=4)
+    point = SimpleNamespace(state=SimpleNamespace(trace=trace), level=54.0)
+    point.model = SimpleNamespace(case=case)
+    end = SimpleNamespace(level=-2.6e9, kink=True)
+    along = SimpleNamespace(along=lambda updates: [end])
+    monkeypatch.setattr(sensitivity, "Differentiation", lambda model, name: along)
+    with pytest.raises(dj.RunError, match="the critical level has no derivative"):
+        sensitivity.of_point(point, ["mu"])
+    end.level = 27.4
+    assert sensitivity.of_point(point, ["mu"])[0].derivatives == {"critical_level": 27.4}

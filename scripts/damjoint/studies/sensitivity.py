@@ -37,6 +37,10 @@ PRINTED = (
 #: Part of the largest change of a result below which another one is round-off.
 ROUNDING = 1e-9
 
+#: Relative change of a critical level over that of a parameter [-] beyond which the system of its
+#: last step was singular to round-off: it has no derivative, as where a crack grows unstably.
+SINGULAR = 1e3
+
 #: All parameters that have a derivative and an effect, as the text of --sensitivity.
 ALL = "all"
 
@@ -119,7 +123,7 @@ def of_point(point: Point, names: Sequence[str]) -> list[Sensitivity]:
     change with the displacement that was prescribed, so that its derivative is that of the highest
     level, the one that a left null vector of the tangent gives.
 
-    Raises InputError, RunError.
+    Raises InputError, RunError where it has none.
     """
     trace = point.state.trace
     if trace is None:
@@ -129,6 +133,11 @@ def of_point(point: Point, names: Sequence[str]) -> list[Sensitivity]:
         for name in names:
             value, *_ = half_difference(point.model.case, name)
             end = Differentiation(point.model, name).along(trace.updates)[-1]
+            if abs(end.level * value) > SINGULAR * point.level:
+                raise RunError(
+                    "sensitivity: the critical level has no derivative: its last equilibrium is "
+                    "one of unstable crack growth, or a point is about to open, slip or break"
+                )
             given = {"critical_level": end.level}
             rows.append(Sensitivity(name, value, float(point.level), given, end.kink))
     return rows
