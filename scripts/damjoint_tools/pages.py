@@ -241,6 +241,7 @@ def validation_pages() -> None:
             others += [report(rows[family], "github", notes=True)]
         if family == "sdnv138":
             others += [QUAKES, quake_conventions(rows[family])]
+    others.append(icold_section())
     (REFERENCE / "published.md").write_text("\n\n".join(others) + "\n")
     lines = []
     for family, shows in FAMILIES.items():
@@ -378,6 +379,13 @@ OTHERS = (
 )
 
 
+def icold_section() -> str:
+    """The section of published.md on a dam whose cracks are not judged, computed again."""
+    from .icold import ABOUT, table
+
+    return "\n\n".join(["<!-- icold -->", ABOUT, table(), "<!-- /icold -->"])
+
+
 def tour_page() -> str:
     """reference/tour.md with its commands run again, one after the other in a temporary folder."""
     from .provenance import provenance, source_line
@@ -425,7 +433,7 @@ def take_bench(out: Path) -> None:
 
 def main(words: list[str]) -> None:
     """Write the pages of a name: bench, trust, parameters, results, tour, laws (a picture),
-    validation or all.
+    validation, icold or all.
     """
     if words[0] == "bench":
         take_bench(Path(words[1]))
@@ -433,6 +441,11 @@ def main(words: list[str]) -> None:
         mark, section = trust_section(Path(words[1]))
         page = REFERENCE / "trust.md"
         page.write_text(between(mark, page.read_text(), section))
+    if words[0] == "icold":
+        page = REFERENCE / "published.md"
+        before, _, rest = page.read_text().partition("<!-- icold -->")
+        after = rest.partition("<!-- /icold -->")[2] or "\n"
+        page.write_text(f"{before.rstrip()}\n\n{icold_section()}{after}")
     if words[0] in ("parameters", "all"):
         (REFERENCE / "parameters.md").write_text(parameters_page())
     if words[0] in ("results", "all"):

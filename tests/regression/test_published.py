@@ -10,6 +10,7 @@ from damjoint.joint.interface import interface_of
 from damjoint.model.loads import Loading
 from damjoint.post import validation
 from damjoint.verification import validate
+from damjoint_tools import icold
 
 #: at most so many Newton iterations: in one step, in all of them (both uplifts of a, b, i counted
 #: apart)
@@ -100,6 +101,16 @@ def test_validate_takes_families_and_cases(command):
     assert code == 0
     assert out.splitlines()[-2].startswith("ssnp162: 27 passed, 0 failed")
     assert out.splitlines()[-1].startswith("ssnv503: 7 passed, 0 failed")
+
+
+def test_the_cracks_of_a_dam_that_is_not_judged():
+    """ICOLD 1999: levels by the height and by the thrust; without tensile strength it cracks."""
+    assert icold.levels(1) == pytest.approx([56, 64, 75.968, 80.28])
+    assert icold.levels(2)[:1] == pytest.approx([80 * 0.7**0.5])
+    chosen = "the case", "the same, of the thrust"
+    strong, weak = (icold.tips(icold.VARIATIONS[name]) for name in chosen)
+    assert strong[:2] == weak[:2] == ["0.0 (0.0)"] * 2
+    assert float(weak[3].split()[0]) > float(weak[2].split()[0]) > 0 == float(strong[2].split()[0])
 
 
 @pytest.mark.parametrize("name, points", [("c_file", 2), ("j_file", 4)])
