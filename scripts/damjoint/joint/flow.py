@@ -120,7 +120,12 @@ class FlowSystem:
     gradients: list[Array]
     #: product of the inverse flow matrix with a matrix (inner nodes, m)
     inverse: Callable[[Array], Array]
+    #: the same for other conductivities (q,)
+    inverse_of: Callable[[Array], Callable[[Array], Array]] | None = None
     share: float = 1.0
+    #: derivative of the flux with the gradient, and with the aperture, over those of the cubic law
+    #: (q,); None: it is that law
+    slowed: Array | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -381,6 +386,10 @@ class Flow:
             parts.append((nodes, before, behind, whole))
         steepness = (drops / self.lengths)[self.points.elements]
 
+        def inverse_of(conductivity: Array) -> Callable[[Array], Array]:
+            other, _ = self._in_lines(conductivity, imposed, heads, known)
+            return other.systems[0].inverse
+
         def inverse(coupling: Array) -> Array:
             """By the Green's function of each part; only Newton's tangent needs it."""
             green = np.zeros((len(total),) * 2)
@@ -394,7 +403,13 @@ class Flow:
         np.add.at(inflow, ends, np.outer(differences / wholes, [-1, 1]))
         solution = FlowSolution(
             pressure=total[self.inside] - imposed[self.inside],
-            systems=[FlowSystem(gradients=[steepness * t for t in self.towards], inverse=inverse)],
+            systems=[
+                FlowSystem(
+                    gradients=[steepness * t for t in self.towards],
+                    inverse=inverse,
+                    inverse_of=inverse_of,
+                )
+            ],
         )
         return solution, inflow
 
@@ -493,8 +508,9 @@ class Flow:
             return np.asarray(sums, float).reshape(shape)
 
         def of(system: FlowSystem) -> Array:
+            slowed = rate if system.slowed is None else rate * system.slowed
             parts = [
-                coupling(terms, rate * gradient)
+                coupling(terms, slowed * gradient)
                 for terms, gradient in zip(self.couplings, system.gradients, strict=True)
             ]
             if stored is not None:

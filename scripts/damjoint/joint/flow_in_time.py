@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -118,20 +118,19 @@ class WaterBalance:
         seconds, begin = self.step.seconds, self.step.begin
         ground, before = self.storage / seconds, begin.volume
         rest = before - self.volume + self.storage * self.elevation
-        form = OnLines if self.flow.dim == 2 else OnSurface
         voids, air = self.guess & ~known, self.guess & dry
         lacking = np.zeros(len(heads))
         for sets in range(MOST_SETS):
-            fixed = np.where(voids, self.lowest + self.elevation, heads)
+            given, fixed = np.where(voids, self.lowest + self.elevation, heads), known | voids
             try:
-                system = form(self.flow, conductivity, ground, known | voids)
+                system = self.matrix(ground, fixed, conductivity)
             except (np.linalg.LinAlgError, ValueError):
                 break
             if sets < FREE_SETS:
                 most = np.maximum(before, 0) / seconds
                 lacking = system.lacking(voids | air, most, self.elevation)
             source = rest / seconds + lacking
-            total = system.solve(source, fixed)
+            total = system.solve(source, given)
             pressure = total - self.elevation
             excess = self.volume + self.storage * pressure - before
             excess += seconds * (system.outflow(total, source) - lacking)
@@ -148,7 +147,13 @@ class WaterBalance:
                 inflow[dry] = np.minimum(excess[dry], 0)
                 return FlowInTime(
                     pressure=(total - imposed)[self.flow.inside],
-                    systems=[FlowSystem(gradients=system.gradients, inverse=system.inverse)],
+                    systems=[
+                        FlowSystem(
+                            gradients=system.gradients,
+                            inverse=system.inverse,
+                            inverse_of=partial(self.inverse_of, ground, fixed),
+                        )
+                    ],
                     volume=self.volume + self.storage * pressure - void,
                     void=void,
                     inflow=inflow,
@@ -162,6 +167,17 @@ class WaterBalance:
             void=nothing,
             inflow=nothing,
         )
+
+    def matrix(self, ground: Array, known: BoolArray, conductivity: Array) -> BalanceMatrix:
+        """See `BalanceMatrix`."""
+        form = OnLines if self.flow.dim == 2 else OnSurface
+        return form(self.flow, conductivity, ground, known)
+
+    def inverse_of(
+        self, ground: Array, known: BoolArray, conductivity: Array
+    ) -> Callable[[Array], Array]:
+        """See `FlowSystem`."""
+        return self.matrix(ground, known, conductivity).inverse
 
 
 class BalanceMatrix(Protocol):

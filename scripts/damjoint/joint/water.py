@@ -21,6 +21,7 @@ from .flow import NO_NODES, Flow, FlowDerivative, FlowSolution, JointFields
 from .flow_in_time import FlowInTime, StoredWater, TimeStep, WaterBalance, stored_at_rest
 from .interface import Interface, JointInterface
 from .joint_laws import JointVariables
+from .turbulence import slowed, turbulent_flow
 
 
 @dataclass(frozen=True)
@@ -287,8 +288,12 @@ class JointWater:
             factor, _ = self.conductivity(*self.opened(jump, variables, before_quake))
             closed = self.case["rho_water"] * self.narrowest**3
             conductivity = closed * factor / (12 * self.case["visc"])
-            if self.system.network or step:
+            if self.system.network or step or self.case["turbulent"]:
                 gradients = self.system.gradients(solution, self)
+                if self.case["turbulent"]:
+                    conductivity = conductivity * slowed(
+                        gradients, 2 * conductivity / self.case["visc"]
+                    )
                 flux, leakage = joint.flow.flux_by(gradients, conductivity, joint.width)
             else:
                 total = self.unit_weight * self.head(loading) + beyond
@@ -329,6 +334,8 @@ class WaterSystem:
         #: voids of the last flow in time, by the number of drained nodes: where the next search
         #: for them begins, whose result does not depend on it
         self.last_voids: dict[int, Array] = {}
+        #: likewise: by how much turbulence slows the last flow
+        self.last_slowed: dict[int, Array] = {}
         #: of the last loadings, see `_heads`
         self.heads = lru_cache(maxsize=4)(self._heads)
 
@@ -414,6 +421,20 @@ class WaterSystem:
             at_ends = weight * ends
 
         def solved(nodes: IntArray, outlet: Array) -> FlowSolution:
+            if not self.members[0].case["turbulent"]:
+                return by_conductivity(conductivity, nodes, outlet)
+            per_gradient = 2 * self.reference * conductivity / self.flow.points.weights
+            per_gradient *= self.members[0].case["rho_water"] / self.members[0].case["visc"]
+            solution, last = turbulent_flow(
+                lambda share: by_conductivity(share * conductivity, nodes, outlet),
+                (self.reference if step else 1) * conductivity,
+                per_gradient,
+                self.last_slowed.get(len(nodes)),
+            )
+            self.last_slowed[len(nodes)] = last
+            return solution
+
+        def by_conductivity(conductivity: Array, nodes: IntArray, outlet: Array) -> FlowSolution:
             if step:
                 return self.solve_in_time(
                     step, jump, conductivity, imposed, at_ends, nodes, weight * outlet
@@ -471,10 +492,15 @@ class WaterSystem:
             lowest=case["pressure_min"],
             guess=self.last_voids.get(len(drains), step.begin.void) > 0,
         )
-        closed = case["aperture_min"] ** 3 / (12 * case["visc"])
-        solution = balance.solve(closed * conductivity, imposed, heads, known, dry)
+        solution = balance.solve(self.reference * conductivity, imposed, heads, known, dry)
         self.last_voids[len(drains)] = solution.void
         return solution
+
+    @property
+    def reference(self) -> float:
+        """w^3/(12 visc) of the closed first joint [m3/(Pa s)]."""
+        case = self.members[0].case
+        return float(case["aperture_min"] ** 3 / (12 * case["visc"]))
 
     @property
     def storage(self) -> Array:
@@ -538,12 +564,11 @@ class WaterSystem:
         ]
         if step is None:
             return self.flow.derivative(solution, np.concatenate(rates))
-        closed = self.members[0].case["aperture_min"] ** 3 / (12 * self.members[0].case["visc"])
         growth = [
             water.case["aperture_min"] * water.aperture(jump, None)[1] for water in self.members
         ]
         stored = self.flow.points.weights * np.concatenate(growth) / step.seconds
-        return self.flow.derivative(solution, closed * np.concatenate(rates), stored)
+        return self.flow.derivative(solution, self.reference * np.concatenate(rates), stored)
 
 
 def water_systems(waters: Sequence[JointWater], interface: Interface) -> list[WaterSystem]:

@@ -63,9 +63,11 @@ def turbulence(case: Case, rows: Table) -> str:
     number = float(np.max(rows.get("Re", steady)))
     if number <= TURBULENT:
         return ""
+    if case["turbulent"]:
+        return ""
     return (
         f"the Reynolds number of the flow reaches {number:.3g}: beyond {TURBULENT} it is "
-        "turbulent, and resists more than the laminar film of the model"
+        "turbulent, and resists more than the laminar film of the model; turbulent = 1 (2D)"
     )
 
 

@@ -53,6 +53,8 @@ def check_joint(joint: Case) -> None:
         raise InputError(
             f"time_unit = {joint['time_unit']:g}: must be 0 with engine = getdp (steady flow)"
         )
+    if joint["turbulent"] and joint["uplift"] == "flow":
+        raise InputError("turbulent = 1: must be 0 with engine = getdp (cubic law)")
     if freezes_uplift(joint):
         raise InputError(
             f"quake_uplift = {joint['quake_uplift']}: must be crack with engine = getdp and "

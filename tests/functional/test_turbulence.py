@@ -1,0 +1,101 @@
+"""Turbulent flow in the joint: friction factors of smooth plates, flow in series, derivatives."""
+
+import numpy as np
+import pytest
+from damjoint import InputError
+from damjoint.input.resolve import load
+from damjoint.joint.flow_in_time import TimeStep
+from damjoint.joint.turbulence import CRITICAL
+from damjoint.model.loads import Loading
+from damjoint.solver.load_stepper import LoadStepper
+from damjoint.solver.model import Model
+from damjoint.statics.hints import hints
+from scipy.optimize import brentq
+
+WATER, DENSITY, VISC = 9810.0, 1000.0, 1e-3
+#: Dam of 28 m on a joint without tension, with a film of water in time.
+FILM = {"law": "friction", "adhesion": 0.0, "mu": 1.5, "uplift": "flow", "n_joint": 24.0}
+FILM |= {"turbulent": 1.0, "storage": 1e-12, "aperture_min": 1e-4}
+
+
+@pytest.fixture(scope="module")
+def model():
+    return Model(load("dam", FILM, (30.0,)))
+
+
+def gradient(flux, width):
+    """Pressure gradient [Pa/m] of a flux per width [m2/s]: f rho v^2 / (4 w) by f itself."""
+    number = 2 * DENSITY * flux / VISC
+    factor = max(96 / number, 0.316 * number**-0.25)
+    return factor * DENSITY * (flux / width) ** 2 / (4 * width)
+
+
+def wedge(model, size):
+    """A jump that opens the joint by `size` [m] at the heel, by a fifth of it at the toe."""
+    system = model.equilibrium.flowing[0]
+    xi = system.fields.at_points @ system.fields.xi
+    return np.linalg.lstsq(system.flow.opening.toarray(), size * (1 - 0.8 * xi), rcond=None)[0]
+
+
+@pytest.mark.parametrize("size", [1e-4, 2e-3, 1e-2])
+def test_steady_flow_in_series(model, size):
+    """One flux in all elements, by the friction factor, and drops that add up to the head."""
+    (system,), variables = model.equilibrium.flowing, model.start().variables
+    jump, loading, flow = wedge(model, size), Loading(30.0, 0.0), system.flow
+    (water,) = system.members
+    flux = water.pressure(jump, variables, loading).flux / DENSITY
+    (steepness,) = system.gradients(system.solve(jump, variables, loading), water)
+    lengths, widths = flow.points.weights, 1e-4 + flow.opening @ jump
+    assert lengths @ steepness == pytest.approx(-30 * WATER, rel=1e-9)
+    of_points = [
+        brentq(lambda q, w=w, g=g: gradient(q, w) + g, 1e-12, 1e3, xtol=1e-16, rtol=1e-14)
+        for w, g in zip(widths, steepness, strict=True)
+    ]
+    means = np.bincount(flow.points.elements, lengths * of_points) / flow.lengths
+    assert means == pytest.approx(np.full(len(means), flux.mean()), rel=1e-8)
+    assert flux == pytest.approx(means, rel=1e-8)
+    assert (2 * DENSITY * flux.mean() / VISC > CRITICAL) == (size > 5e-3)
+
+
+@pytest.mark.parametrize("seconds", [1e-3, 0.1, None])
+def test_the_derivative_is_that_of_finite_differences(model, seconds):
+    """Of the film that a crack squeezes as it closes, with voids, and of steady flow."""
+    (system,), variables = model.equilibrium.flowing, model.start().variables
+    jump, loading = wedge(model, 2e-3 if seconds else 1e-2), Loading(30.0, 0.0)
+    step = None
+    if seconds:
+        begin = system.stored_at(jump, variables, loading, 0.0)
+        step = TimeStep(seconds=seconds, begin=begin)
+    solve = lambda at: system.solve(at, variables, loading, None, step)
+    solution = solve(0.99 * jump)
+    derivative = system.derivative(0.99 * jump, variables, solution, None, step)
+    (slowed,) = (flow.slowed for flow in solution.systems)
+    assert slowed.min() < 0.57  # in part turbulent
+    way = np.random.default_rng(1).normal(size=len(jump)) * 1e-10
+    above, below = (solve(0.99 * jump + s * way).pressure for s in (1, -1))
+    expected = derivative.pressure @ way[derivative.columns]
+    assert (above - below) / 2 == pytest.approx(expected, abs=1e-5 * np.abs(expected).max())
+    if step:
+        stored = solution.stored(1.0, step.begin)
+        kept = stored.volume.sum() - stored.inflow.sum()
+        assert kept == pytest.approx(step.begin.volume.sum(), rel=1e-11)
+
+
+def test_it_resists_more():
+    """Under a flood: less leaks, the Reynolds number is smaller, and nothing is noted."""
+    settings = FILM | {"time_unit": 600.0, "aperture_min": 2e-3}
+    laminar, turbulent = (
+        LoadStepper(load("dam", settings | {"turbulent": t}, (30.0, 44.0), None, 5)).run()
+        for t in (0.0, 1.0)
+    )
+    assert turbulent.history["Re"][-1] < 0.5 * laminar.history["Re"][-1]
+    said = [any("Reynolds" in hint for hint in hints(run)) for run in (laminar, turbulent)]
+    assert said == [True, False]
+
+
+def test_refused(command):
+    with pytest.raises(InputError, match="turbulent = 1: must be 0 in 3D"):
+        load("dam", FILM | {"dim": 3.0})
+    words = "run", "dam", "--engine", "getdp", "--set", "uplift=flow", "--set", "turbulent=1"
+    code, out, error = command(*words)
+    assert (code, out) == (2, "") and "turbulent = 1: must be 0 with engine = getdp" in error
