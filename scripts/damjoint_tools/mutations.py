@@ -144,6 +144,20 @@ MUTATIONS = (
         having("uplift", "flow"),
     ),
     Mutation(
+        "storage x 1.02",
+        "joint/water.py",
+        'stored = self.members[0].case["storage"] * flow.points.weights',
+        'stored = 1.02 * self.members[0].case["storage"] * flow.points.weights',
+        having("time_unit"),
+    ),
+    Mutation(
+        "voids lose their water",
+        "joint/flow_in_time.py",
+        "volume=self.volume + self.storage * pressure - void,",
+        "volume=self.volume + self.storage * pressure,",
+        having("time_unit"),
+    ),
+    Mutation(
         "G_t x 1.1",
         "laws/bond.py",
         'self.progress_per_slip = self.cohesion / (2 * p["G_t"])',

@@ -11,6 +11,7 @@ from damjoint.input.case import Case
 
 from .random_scenes import (
     CURVE_DRAWS,
+    TIME_DRAWS,
     Drawn,
     RandomNumbers,
     RandomScene,
@@ -116,7 +117,19 @@ def random_quake(seed: int, number: int, folder: Path) -> RandomQuake:
     draw = {DAM: dam, ELASTIC: elastic, BLOCK: block}[kind]
     drawn_scene = draw(rng, scene, solid)
     settings = with_curve(drawn_scene.settings, RandomNumbers(seed, number, CURVE_DRAWS))
-    return replace(drawn_scene, settings=settings)
+    drawn_scene = replace(drawn_scene, settings=settings)
+    if solid or kind != DAM:
+        return drawn_scene
+    return with_transient(drawn_scene, RandomNumbers(seed, number, TIME_DRAWS))
+
+
+def with_transient(scene: RandomQuake, rng: RandomNumbers) -> RandomQuake:
+    """A scene, some of those with flow with that of the water in time while the earthquake acts."""
+    waters = set(np.ravel(scene.settings["uplift"]))
+    if not rng.event(0.5) or "flow" not in waters or "cracked" in waters:
+        return scene
+    drawn = {"quake_uplift": "transient", "storage": rng.log_uniform(1e-13, 1e-10)}
+    return replace(scene.changed(**drawn), checks=())
 
 
 def quake_joint(rng: RandomNumbers) -> Drawn:

@@ -17,8 +17,9 @@ Choice = TypeVar("Choice")
 Drawn: TypeAlias = dict[str, Any]
 
 #: Third number of the seed of the lift joints, of temperature, works on the joint, waterstop, law =
-#: endo and variants of loads, of joints that meet, and of softening curves, which are drawn apart.
-LIFT_DRAWS, WORKS_DRAWS, NETWORK_DRAWS, CURVE_DRAWS = 1, 3, 4, 5
+#: endo and variants of loads, of joints that meet, of softening curves, and of flow in time, which
+#: are drawn apart.
+LIFT_DRAWS, WORKS_DRAWS, NETWORK_DRAWS, CURVE_DRAWS, TIME_DRAWS = 1, 3, 4, 5, 6
 #: Parameters that are drawn for each joint, but for the place of its drains.
 OF_JOINTS = (
     *("law", "K_N", "K_T", "sigma_max", "adhesion", "mu", "pena_rupture", "alpha", "pena_tang"),
@@ -123,7 +124,24 @@ def random_scene(seed: int, number: int) -> RandomScene:
     rng = RandomNumbers(seed, number, NETWORK_DRAWS)
     scene = network(rng) if rng.event(0.06) else scene
     settings = with_curve(scene.settings, RandomNumbers(seed, number, CURVE_DRAWS))
+    settings = with_time(settings, RandomNumbers(seed, number, TIME_DRAWS))
     return replace(scene, settings=settings)
+
+
+def with_time(settings: Drawn, rng: RandomNumbers) -> Drawn:
+    """Settings, in some of plane dams with flow that of the water in time, within its conditions:
+    no joint with `cracked`, no earthquake, no controlled displacement.
+    """
+    waters = set(np.ravel(settings["uplift"]))
+    other = {"dim", "drive", "k_h"} & settings.keys()
+    if not rng.event(0.5) or "flow" not in waters or "cracked" in waters or other:
+        return settings
+    return settings | {
+        "time_unit": rng.log_uniform(0.1, 1e5),
+        "time_start": rng.choice(0, 1),
+        "storage": rng.log_uniform(1e-13, 1e-10),
+        "pressure_min": rng.choice(0, -1e5),
+    }
 
 
 def with_curve(settings: Drawn, rng: RandomNumbers) -> Drawn:

@@ -47,6 +47,12 @@ COMPARED = (
         "1e-9 of the largest pressure, 1e-6 in 3D",
     ),
     (
+        "pressure of flow in time (`time_unit`, `quake_uplift` = transient; 2D)",
+        "what each node stores and what flows to it, replayed step by step along the written "
+        "openings, with voids and drains",
+        "1e-9 of the largest pressure",
+    ),
+    (
         "displacement jumps",
         "both bodies by scikit-fem on the written mesh, under the loads, temperature, and the "
         "written tractions and pressures",
@@ -89,9 +95,8 @@ time limit is a defect.
 
 Not checked here: stresses in the bodies and pictures; the default values themselves; that the
 branch which the load steps follow is the one that a dam would take, where there are several
-equilibria; geometries of one's own, but for two blocks whose joints meet; flow in time
-(`time_unit` > 0); the reference GetDP model (the tests compare it with the engine of these
-runs)."""
+equilibria; geometries of one's own, but for two blocks whose joints meet; flow in time in 3D;
+the reference GetDP model (the tests compare it with the engine of these runs)."""
 
 #: What `damjoint stress --quake` verifies in every scene, and beside it.
 QUAKES_VERIFIED = """\
@@ -108,7 +113,7 @@ QUAKES_VERIFIED = """\
 - *Water*: the pressure at every node and integration point of every time step, by `quake_uplift`:
   the flow through the openings at the beginning of the step, that of the static state, or none in
   the elements of the crack that are open then, by the replayed law; to 1e-9 of the largest
-  pressure, 1e-6 in 3D; `transient` is not drawn. $U$ of up to 200 frames is its integral (2D).
+  pressure, 1e-6 in 3D; with `transient` as flow in time. $U$ of up to 200 frames is its integral (2D).
 - *Tables*: the static states before and after, laws, water and sums, as those of a run.
 - *End*: the static state after the earthquake by hand, and that there is one if the rigid block
   certainly stands; peaks and residual slip are those of the rows; the exit code."""

@@ -16,6 +16,7 @@ again, slowly and plainly, from the formulas of reference/theory.md.
 | `elasticity` | displacement jumps, from loads and tractions of the joints |
 | `again` | independence of steps; critical values |
 | `stops` | whether there is no equilibrium beyond the last state, by limit analysis |
+| `water_in_time` | pressure of water that is stored, from the openings of all steps |
 | `water_in_motion` | pressure in every time step of an earthquake, by `quake_uplift` |
 | `earthquake` | balance of momentum and motion of every time step |
 | `verify` | all of them, for the files of a run |

@@ -42,14 +42,14 @@ def follows_history(asked: Asked, first_step: bool = True) -> bool:
     """Return whether the state under rising water may depend on the way there: where a joint slips
     under a load that the water turns back (temperature; earthquake and anchor against the water),
     grouting and sawing, a first step that bears the weight with a part of the water (unless
-    first_step is false: it is the same), a controlled displacement.
+    first_step is false: it is the same), a controlled displacement; where water flows in time.
     """
     first = asked.joints[0]
     heat = any(first[f"temperature_{part}"] for part in ("dam", "linear", "found"))
     works = any(v["grout_pressure"] or v["saw_thickness"] for v in asked.joints)
     against = first["k_h"] < 0 or (first["anchor_force"] > 0 and first["anchor_angle"] > 0)
     driven = first["drive"] != "level" or (first_step and not first["weight_first"])
-    return bool(heat or works or against or driven)
+    return bool(heat or works or against or driven or first["time_unit"])
 
 
 def follows_steps(asked: Asked, *records: dict[str, Any]) -> bool:

@@ -188,19 +188,24 @@ def bookkeeping(whole: Shaken) -> Iterator[str]:
 
 def ground_motion(whole: Shaken, times: Array) -> tuple[Array, float]:
     """The ground's acceleration (n, 2) at times (n,), and the end of record and rest [s]; of a
-    record that starts at t = 0 with no acceleration.
+    record that starts at t = 0 with no acceleration; before the rest it ends within an interval.
     """
     v, path = whole.values, whole.asked.record
     assert path
     # without comments and heading
     lines = (line for line in path.read_text().splitlines() if line[:1].isdigit())
     table = np.array([line.split(",") for line in lines], float)
+    end = float(table[-1, 0]) + v["record_rest"]
+    if v["record_rest"] > 0:
+        rest = np.zeros(table.shape[1])
+        rest[0] = table[-1, 0] + np.diff(table[:, 0]).min()
+        table = np.vstack([table, rest])
     scale = v["record_scale"] * (STANDARD_GRAVITY if v["record_unit"] == "g" else 1.0)
     axes = {"horizontal": {0}, "vertical": {1}, "both": {0, 1}}[v["record_component"]]
     result, record_times = np.zeros((len(times), 2)), table[:, 0] + travel_time(v, table[:, 0])
     for axis in axes & set(range(table.shape[1] - 1)):
         result[:, axis] = scale * np.interp(times, record_times, table[:, axis + 1], right=0.0)
-    return result, float(record_times[-1] + v["record_rest"])
+    return result, end + travel_time(v, table[:, 0])
 
 
 def travel_time(v: Values, times: Array) -> float:

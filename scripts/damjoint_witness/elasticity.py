@@ -65,6 +65,7 @@ from .solids import (
 )
 from .water import Heads, JointState, heads_of, places, pressure
 from .water import states as joint_states
+from .water_in_time import heads_in_time
 
 #: Error of a jump, over the largest jump or displacement at the joints: the residual of the step
 #: times OF_RESIDUAL (forces out of balance by a part of the loads move the faces by about the same
@@ -701,6 +702,8 @@ class JointForces:
     heads: Heads
     nodes: Table
     points: Table
+    #: pressure [Pa] at which voids form in the water
+    least: float = 0.0
 
     @cached_property
     def frame(self) -> Array:
@@ -725,7 +728,7 @@ class JointForces:
         at = sides.at(positions, width * table["weight"])
         total -= body.forces(sides, at, traction @ self.frame)
         wet = wet_points(self.state, sides)
-        p = pressure(self.state, self.heads)(wet.positions)
+        p = pressure(self.state, self.heads, self.least)(wet.positions)
         return total + body.forces(sides, wet, p[:, None] * self.frame[0])
 
 
@@ -774,13 +777,16 @@ def violations(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
     path = next((files.folder / "fields").glob("bulk_t*.vtu"))
     names = [(j["upper"], j["lower"]) for j in files.record["joints"]] or [("dam", "foundation")]
     dam = Dam(asked, read_solids(path), tuple(names))
+    in_time = heads_in_time(files, asked, steps)
     for update, states in joint_states(files, asked, steps):
         own = rows_where(steps, steps["update"] == update)
-        joints = []
-        for joint, heads in zip(states, heads_of(states), strict=True):
+        joints, stored = [], in_time.get(update, {})
+        for joint, steady in zip(states, heads_of(states), strict=True):
+            heads = stored.get(joint.number, steady)
+            least = joint.values["pressure_min"] if joint.number in stored else 0.0
             table = rows_where(own, own["joint"] == joint.number + 1)
             nodes, points = (rows_where(table, (table["weight"] > 0) == w) for w in (False, True))
-            joints.append(JointForces(joint, heads, nodes, points))
+            joints.append(JointForces(joint, heads, nodes, points, least))
         time, level, tail = (float(own[name][0]) for name in ("time", "level", "tail_level"))
         residual = residual_at(files, float(states[0].rows["time"][0]))
         yield from jumps_at(dam, joints, Loads(asked, time, level, tail), residual)

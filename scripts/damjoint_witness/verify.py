@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cached_property
 
-from . import earthquake, replay, statics, stops, tables, water, water_in_motion
+from . import earthquake, replay, statics, stops, tables, water, water_in_motion, water_in_time
 from .files import Files, Table, read_table, rows_where
 from .reader import Asked, read
 
@@ -51,6 +51,7 @@ class Witness:
             yield from tables.integrals(files, asked, still)
         yield from tables.nodes(files, asked, still)
         yield from water.violations(files, asked, steps)
+        yield from water_in_time.violations(files, asked, steps)
         yield from replay.laws(steps, asked.joints)
 
     def _elasticity(self) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 By `quake_uplift`, section 5 and 11 of reference/theory.md: that of the static state, of the
 openings at the beginning of the step, or none in the elements of the crack that are open then.
-Water in motion (`transient`) is not computed again.
+Water that is stored (`transient`): see water_in_time.
 """
 
 from __future__ import annotations

@@ -227,7 +227,7 @@ class Model:
     @property
     def in_time(self) -> bool:
         """Whether water that flows is stored in the joints."""
-        return bool(self.equilibrium.flowing) and flows_in_time(self.case)
+        return bool(self.equilibrium.flowing) and any(map(flows_in_time, self.case.joints))
 
     def water_steps(self, state: State, time: float) -> tuple[TimeStep, ...]:
         """The steps of what is stored in the joints from a state to a time; empty if the flow is
