@@ -68,7 +68,7 @@ def figure(results: Results) -> Figure:
     levels.set_ylabel("m", fontsize=8)
     for name, color, words in (
         ("water", WATER, "stored"),
-        ("water_in", ORANGE, "come in"),
+        ("water_in", ORANGE, "inflow"),
         ("void", GREY, "void"),
     ):
         water.plot(time, 1e3 * rows[name][shown], color=color, label=f"{words} [l/m]")

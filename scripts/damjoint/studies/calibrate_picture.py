@@ -44,7 +44,11 @@ def figure(answer: Calibration) -> Figure:
     for number, (in_time, residuals) in enumerate(table):
         draw_series(in_time, answer, number)
         draw_residuals(residuals, answer, number)
-    table[-1, 0].set_xlabel("reading", fontsize=8)
+    dates = answer.measurements.dates
+    for in_time in table[:, 0] if any(dates) else ():
+        in_time.xaxis.set_major_formatter(lambda t, _: dict(enumerate(dates, 1)).get(round(t), ""))
+        in_time.tick_params(axis="x", labelsize=7)
+    table[-1, 0].set_xlabel("date" if any(dates) else "reading", fontsize=8)
     table[-1, 1].set_xlabel("level [m]", fontsize=8)
     return picture
 
