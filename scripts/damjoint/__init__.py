@@ -47,30 +47,7 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
 
-    from .library import LAWS as LAWS
-    from .library import Case as Case
-    from .library import Checks as Checks
-    from .library import Critical as Critical
-    from .library import JointTable as JointTable
-    from .library import Law as Law
-    from .library import Modes as Modes
-    from .library import Quake as Quake
-    from .library import Reliability as Reliability
-    from .library import Run as Run
-    from .library import Sample as Sample
-    from .library import Step as Step
-    from .library import Sweep as Sweep
-    from .library import calibrate as calibrate
-    from .library import case as case
-    from .library import check as check
-    from .library import critical as critical
-    from .library import load_steps as load_steps
-    from .library import modes as modes
-    from .library import quake as quake
-    from .library import reliability as reliability
-    from .library import run as run
-    from .library import sensitivity as sensitivity
-    from .library import sweep as sweep
+    from .library import *  # noqa: F403
 
 __version__ = "0.2.0"
 

@@ -60,8 +60,8 @@ class Record:
         folders.write_state(self.name, self.path, state, statement, further)
 
     @contextlib.contextmanager
-    def of_block(self) -> Iterator[None]:
-        """Record an early end of the block of a study."""
+    def recording(self) -> Iterator[None]:
+        """Record an early end of the study that follows."""
         try:
             versions.git_status()  # runs on another core meanwhile
             yield
@@ -143,7 +143,7 @@ def session(case: Case, out: Path, keep: bool = False, key: str = "") -> Iterato
     """
     study = Session(case, out, key)
     with folders.claim_output_folder(case.name, out, keep):
-        with study.of_block():
+        with study.recording():
             yield study
         study.complete()
 

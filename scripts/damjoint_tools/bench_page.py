@@ -403,7 +403,7 @@ def bench(out: Path, short: bool) -> None:
     """
     out.mkdir(parents=True, exist_ok=True)
     record = Record("bench", out / RECORD)
-    with locked_folder(out), record.of_block():
+    with locked_folder(out), record.recording():
         measurements = Measurements(out / "measured.jsonl", short)
         tables, precise = measure(measurements)
         for name, table in tables.items():

@@ -12,31 +12,19 @@ Only `Run.save` writes to disk.
 
 from __future__ import annotations
 
-from .. import LIBRARY
-from ..input.case import Case as Case
-from ..laws import LAWS as LAWS
-from ..laws import Law as Law
-from ..studies.plan import Sample as Sample
-from .cases import case as case
-from .checks import Checks as Checks
-from .checks import check as check
-from .critical_values import Critical as Critical
-from .critical_values import critical as critical
-from .quakes import Modes as Modes
-from .quakes import Quake as Quake
-from .quakes import modes as modes
-from .quakes import quake as quake
-from .runs import Run as Run
-from .runs import Step as Step
-from .runs import load_steps as load_steps
-from .runs import run as run
-from .sweeps import Sweep as Sweep
-from .sweeps import sweep as sweep
-from .tables import JointTable as JointTable
-from .uncertainty import Reliability as Reliability
-from .uncertainty import calibrate as calibrate
-from .uncertainty import reliability as reliability
-from .uncertainty import sensitivity as sensitivity
+from ..input.case import Case
+from ..laws import LAWS, Law
+from ..studies.plan import Sample
+from .cases import case
+from .checks import Checks, check
+from .critical_values import Critical, critical
+from .quakes import Modes, Quake, modes, quake
+from .runs import Run, Step, load_steps, run
+from .sweeps import Sweep, sweep
+from .tables import JointTable
+from .uncertainty import Reliability, calibrate, reliability, sensitivity
 
-#: What `import damjoint` offers.
-__all__ = [*LIBRARY]
+#: What `import damjoint` offers, as in its `LIBRARY`.
+__all__ = ["LAWS", "Case", "Checks", "Critical", "JointTable", "Law", "Modes", "Quake", "Run"]
+__all__ += ["Reliability", "Sample", "Step", "Sweep", "calibrate", "case", "check", "critical"]
+__all__ += ["load_steps", "modes", "quake", "reliability", "run", "sensitivity", "sweep"]

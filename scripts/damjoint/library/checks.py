@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, overload
 
 from .. import InputError, runner
 from ..input.case import Case
-from ..model.results import Columns, Results
+from ..model.results import Results
 from ..python_words import speaks_python
 from .cases import as_case, noted
-from .tables import WithTables, by_column, displayed
+from .tables import Tables, WithTables, by_column, displayed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,7 +50,7 @@ class Checks(WithTables, Sequence["SafetyCheck"]):
         return sum(len(checks) for _, checks in self.cases)
 
     @property
-    def by_name(self) -> Mapping[str, tuple[Mapping[str, Any], Columns]]:
+    def by_name(self) -> Tables:
         """The table rows, that of check.csv: a row per case, joint and method, and one of the
         methods' difference.
         """

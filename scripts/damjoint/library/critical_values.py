@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..arrays import Value
 from ..input.case import Case
 from ..input.resolve import varied
-from ..model.results import Columns
 from ..python_words import all_in_python, speaks_python
 from .cases import as_case, as_list, noted, on_fixed_mesh
-from .tables import WithTables, displayed, records
+from .tables import Tables, WithTables, displayed, records
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -72,7 +71,7 @@ class Critical(WithTables):
         return displayed(figure_of(content(self.search, self.answer)))
 
     @property
-    def by_name(self) -> Mapping[str, tuple[Mapping[str, Any], Columns]]:
+    def by_name(self) -> Tables:
         """The table equilibria."""
         from ..studies.critical_study import table
         from ..studies.failure_path import critical_columns

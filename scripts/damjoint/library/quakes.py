@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,10 +11,10 @@ import numpy as np
 from .. import InputError
 from ..arrays import Array, Table
 from ..input.case import Case
-from ..model.results import MODES, Columns, history_columns, joint_columns, quake_columns
+from ..model.results import MODES, history_columns, joint_columns, quake_columns
 from ..python_words import speaks_python
 from .cases import as_case, noted
-from .tables import JointTable, WithTables, displayed, records
+from .tables import JointTable, Tables, WithTables, displayed, records
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -101,7 +100,7 @@ class Quake(WithTables):
         return displayed(figure(self.tables))
 
     @property
-    def by_name(self) -> Mapping[str, tuple[Table, Columns]]:
+    def by_name(self) -> Tables:
         """The tables rows, that of quake.csv: a row per time step; history, joint and, not by
         GetDP, frames.
         """
@@ -182,7 +181,7 @@ class Modes(WithTables):
         return np.array([mode.frequency for mode in self.natural.variants[0].modes])
 
     @property
-    def by_name(self) -> Mapping[str, tuple[Mapping[str, Any], Columns]]:
+    def by_name(self) -> Tables:
         """The table rows, that of modes.csv: a row per mode of each water on each rock."""
         return {"rows": (self.natural.table, MODES)}
 

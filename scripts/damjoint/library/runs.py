@@ -16,7 +16,7 @@ from ..engines import Outcome
 from ..engines.condensed.solve import threads_of
 from ..input.case import Case
 from ..model.fields import Solution
-from ..model.results import Columns, Results, history_columns, joint_columns
+from ..model.results import Results, history_columns, joint_columns
 from ..python_words import all_in_python, in_python, speaks_python
 from ..solver.load_stepper import LoadStepper
 from ..solver.state import State
@@ -25,7 +25,7 @@ from ..statics.statement import statement
 from ..statics.verdict import verdict
 from ..threads import limited_threads
 from .cases import as_case, noted
-from .tables import JointTable, WithTables, attributes, displayed, optional, records
+from .tables import JointTable, Tables, WithTables, attributes, displayed, optional, records
 
 if TYPE_CHECKING:
     import xarray
@@ -101,7 +101,7 @@ class Run(WithTables):
         runner.write_outcomes(self.case, [self.outcome], Path(out))
 
     @property
-    def by_name(self) -> Mapping[str, tuple[Table, Columns]]:
+    def by_name(self) -> Tables:
         """The tables joint and history."""
         results, case = self.results, self.case
         return {

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .. import InputError
 from ..arrays import Value
 from ..input.case import Case
-from ..model.results import HISTORY, IN_TIME, LATERAL, Columns, history_columns
+from ..model.results import HISTORY, IN_TIME, LATERAL, history_columns
 from ..progress import track
 from ..python_words import speaks_python
 from ..studies.plan import Plan, Sample, cases_of, column_of, in_file, listed, plan_with
 from .cases import as_case, noted, on_fixed_mesh, warn
-from .tables import WithTables, by_column, displayed, records
+from .tables import Tables, WithTables, by_column, displayed, records
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,7 +82,7 @@ class Sweep(WithTables):
         return displayed(figure_of(self.plan, self.texts, cases, title))
 
     @property
-    def by_name(self) -> Mapping[str, tuple[Mapping[str, Any], Columns]]:
+    def by_name(self) -> Tables:
         """The table rows, one per combination: the varied values (a level as level_requested), the
         last row of history.csv, failed, verdict, statement, the critical value; nan without an
         equilibrium.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -74,12 +74,16 @@ class JointTable(np.recarray):
         return rows
 
 
+#: Tables by name: values by column; unit and meaning of columns.
+Tables: TypeAlias = Mapping[str, tuple[Mapping[str, Any], Columns]]
+
+
 class WithTables:
     """A result with tables; the first one is that of `units` and, by default, of `to_pandas`."""
 
     @property
-    def by_name(self) -> Mapping[str, tuple[Mapping[str, Any], Columns]]:
-        """Each table by its name: values by column; unit and meaning of columns."""
+    def by_name(self) -> Tables:
+        """Each table."""
         raise NotImplementedError
 
     def named(self, name: str) -> tuple[Mapping[str, Any], Columns]:

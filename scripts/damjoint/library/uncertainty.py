@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .. import RunError
 from ..input.case import Case
-from ..model.results import Columns
 from ..python_words import speaks_python
 from .cases import as_case, noted, on_fixed_mesh
-from .tables import WithTables, records
+from .tables import Tables, WithTables, records
 
 if TYPE_CHECKING:
     from ..studies.calibrate import Calibration
@@ -73,7 +72,7 @@ class Reliability(WithTables):
         return [one.words() for one in self.results]
 
     @property
-    def by_name(self) -> Mapping[str, tuple[Mapping[str, Any], Columns]]:
+    def by_name(self) -> Tables:
         """The table rows, one per joint if no other could fail, and one of all: joint (empty: all),
         beta, probabilities form, breitung, tvedt (SORM), sampled with the limits low, high of its
         95 % interval; nan where a method has none.

@@ -178,7 +178,7 @@ def rows_session(
     """
     with result_file(path, columns, numeric) as (file, done):
         study = SavedRows(name, file, notes)
-        with study.of_block():
+        with study.recording():
             yield study, done
             file.check_exists()
         recorded = (folders.read_record(study.path) or {}).get("state") == folders.COMPLETE
