@@ -287,10 +287,10 @@ def test_invalid_output_of_getdp_is_reported(command, tmp_path, fake_getdp, prin
     [
         ("true", "ended without writing status.txt"),
         ("echo 0 > status.txt; touch history.txt", "no step at t = 4"),
-        ("echo 0 > status.txt; echo step 1 3 x y z 1 1 > history.txt", "'x'"),
+        ("echo 0 > status.txt; echo step 1 3 x y z 1 1 1 1 > history.txt", "'x'"),
         ("echo 0 > status.txt; head -c 900 /dev/urandom > history.txt", "tables can not be read"),
         (
-            "echo 1 > status.txt; echo step 1 3 1 1 1 1 1 > history.txt; "
+            "echo 1 > status.txt; echo step 1 3 1 1 1 1 1 1 1 > history.txt; "
             "echo joint 1 1 1 1 1 1 1 1 1 1 1 1 1 > joints.txt",
             "jump_0_1",
         ),
