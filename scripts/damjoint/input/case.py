@@ -165,7 +165,7 @@ class Case(ParameterValues):
         if self.source is None:
             return {}
         text, known = self.source.text, declared()
-        of_blocks = {n: tuple(text.recording(n)) for n in text.in_blocks}
+        of_blocks = {n: tuple(text.of_block(n)) for n in text.in_blocks}
         of_file = {**text.defaults, **of_blocks, **text.of_joints}
         of_user = {n: v for n, v in of_file.items() if n in text.of_user}
         return {n: v for n, v in {**of_user, **self.source.overrides}.items() if n in known}

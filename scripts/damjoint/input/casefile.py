@@ -80,7 +80,7 @@ class CaseText:
         """The parameters that blocks of joints set."""
         return list(dict.fromkeys(name for values in self.blocks.values() for name in values))
 
-    def recording(self, name: str) -> Iterator[Value]:
+    def of_block(self, name: str) -> Iterator[Value]:
         """The values of a parameter in the blocks of joints that set it."""
         return (values[name] for values in self.blocks.values() if name in values)
 
