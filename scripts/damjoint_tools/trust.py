@@ -49,7 +49,8 @@ COMPARED = (
     (
         "pressure of flow in time (`time_unit`, `quake_uplift` = transient; 2D)",
         "what each node stores and what flows to it, replayed step by step along the written "
-        "openings, with voids and drains",
+        "openings, with voids and drains; no longer after a step in which water that runs down "
+        "leaves no set of nodes with voids",
         "1e-9 of the largest pressure",
     ),
     (
@@ -113,7 +114,8 @@ QUAKES_VERIFIED = """\
 - *Water*: the pressure at every node and integration point of every time step, by `quake_uplift`:
   the flow through the openings at the beginning of the step, that of the static state, or none in
   the elements of the crack that are open then, by the replayed law; to 1e-9 of the largest
-  pressure, 1e-6 in 3D; with `transient` as flow in time. $U$ of up to 200 frames is its integral (2D).
+  pressure, 1e-6 in 3D; with `transient` as flow in time. $U$ of up to 200 frames is its integral
+  (2D).
 - *Tables*: the static states before and after, laws, water and sums, as those of a run.
 - *End*: the static state after the earthquake by hand, and that there is one if the rigid block
   certainly stands; peaks and residual slip are those of the rows; the exit code."""

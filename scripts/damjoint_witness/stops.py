@@ -65,8 +65,9 @@ class Joint:
 
     @property
     def last(self) -> dict[str, float]:
-        """The last row of the history of the joint."""
-        return {name: float(v[-1]) for name, v in self.files.history_of(self.number).items()}
+        """The last row of the history of the joint; zeros before the first one."""
+        rows = self.files.history_of(self.number).items()
+        return {name: float(v[-1]) if len(v) else 0.0 for name, v in rows}
 
     def forces(self, most_uplift: bool) -> Forces:
         """Forces at the smallest step beyond the last state: under the uplift of that state, or the

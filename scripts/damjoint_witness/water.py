@@ -714,8 +714,8 @@ def update_at(steps: Table, time: float, level: float) -> float:
 
 
 def violations(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
-    """Yield where pressure or flux differ from those that follow from the openings; in 3D of a run
-    with fields, which have the elements of the joints. Not where water is stored, see water_in_time.
+    """Yield where pressure or flux differ from those that follow from the openings, but where water
+    is stored, see water_in_time; in 3D of a run with fields, which have the elements of the joints.
     """
     plane = asked.joints[0]["dim"] == 2
     room = DIGITS if plane else IN_3D

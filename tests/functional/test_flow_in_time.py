@@ -225,6 +225,24 @@ def test_flow_beyond_laminar_is_said():
     assert wild.history["Re"][-1] > 0.5 * steady > 2000
 
 
+def test_a_dry_end_has_no_suction():
+    """Its head is its elevation, above the water: a joint between two dry ends stays dry."""
+    settings = {"joint_height": 20.0, "pressure_min": -1e5, "n_joint": 8.0, "order": 1.0}
+    runs = [
+        dam((10.0,), steps=1, **settings | water).run()
+        for water in ({"time_unit": 60.0, "storage": 1e-12}, {"uplift": "none"})
+    ]
+    assert np.abs(runs[0].joint["p"]).max() < 1e-6
+    assert runs[0].last["N"] == pytest.approx(runs[1].last["N"], rel=1e-12)
+
+
+def test_water_flows_in_time_in_a_lift_only():
+    """Whatever the uplift of the first joint."""
+    lifts = {"lift_heights": (15.0,), "uplift": ("none", "flow"), "n_joint": 8.0, "order": 1.0}
+    results = dam((40.0,), steps=2, time_unit=3600.0, **lifts).run()
+    assert results.last["water"] == 0 and results.last["water_2"] > 0
+
+
 def test_steady_before_the_start():
     """As steady flow up to the level of `time_start`, then slower than it."""
     steady, late = dam(), dam(time_unit=60.0, time_start=1.0)

@@ -21,7 +21,7 @@ from damjoint_tools import (
 )
 from damjoint_tools.random_quakes import RandomQuake, random_quake
 from damjoint_witness import earthquake as witness_of_quakes
-from damjoint_witness import water_in_motion
+from damjoint_witness import water_in_motion, water_in_time
 from damjoint_witness.files import Files, read_table
 from damjoint_witness.verify import Witness
 from quakes import BLOCK, DAM, earthquake, mean_slip, smooth_record, write_record
@@ -150,6 +150,18 @@ def test_the_water_of_every_step_follows_from_the_openings(tmp_path, settings):
     joints = tuple({**values, "quake_uplift": other} for values in run.asked.joints)
     found = water_in_motion.violations(run.files, replace(run.asked, joints=joints), run.steps)
     assert any("Pa at t = " in words for words in found)
+
+
+@pytest.mark.heavy
+def test_the_stored_water_of_every_step_is_replayed(tmp_path):
+    """With another storage the pressure is wrong, while the joint opens and closes."""
+    record = smooth_record(tmp_path / "wave.csv", 6.0, duration=0.3)
+    settings = {"uplift": "flow", "quake_uplift": "transient", "storage": 1e-12}
+    run = verified_quake(DAM | settings | {"record_rest": 0.1}, "35", record, tmp_path / "out")
+    assert run.violations() == []
+    joints = tuple({**values, "storage": 1.02e-12} for values in run.asked.joints)
+    found = water_in_time.violations(run.files, replace(run.asked, joints=joints), run.steps)
+    assert "joint 1: p of the flow in time off" in "".join(found)
 
 
 @pytest.mark.parametrize("column", ["delta_n", "tau_1", "p"])

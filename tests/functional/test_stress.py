@@ -198,6 +198,7 @@ def test_scenes_have_all_that_is_drawn_and_can_be_loaded():
     for drawn in ("law=endo", "temperature_dam", "grout_pressure", "saw_thickness", "monoliths"):
         assert drawn in words
     assert "uplift=waterstop" in words and "quake_uplift=unchanged" in words
+    assert "time_unit" in words
     for number, scene in enumerate(scenes):  # later draws leave the first ones as they were
         single = random_scenes.single_joint_scene(7, number)
         assert len(single.case.joints) == 1

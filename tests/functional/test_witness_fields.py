@@ -8,7 +8,7 @@ import shutil
 import numpy as np
 import pytest
 from damjoint import cli
-from damjoint_witness import elasticity, water
+from damjoint_witness import elasticity, water, water_in_time
 from damjoint_witness.files import Files, read_table
 from damjoint_witness.reader import read
 
@@ -31,6 +31,11 @@ SCENES = {
     "polygon": "run dam --set downstream_face=30,12,12,30,4,40 --set lift_heights=20,36 --set "
     "temperature_linear=-6 --set k_h=0.05 --levels 44 --tail-levels 25",
     "monoliths": "run monoliths --run-geo --set uplift=flow,cracked,imposed --levels 43",
+    "flood": "run dam --set law=friction --set adhesion=0 --set mu=1.5 --set dam_base=28 --set "
+    "order=1 --set uplift=flow --set time_unit=3 --set storage=1e-11 --set pressure_min=-1e5 --set "
+    "drains=1 --set drain_x=7 --levels 30,44,40 --tail-levels 0,5,2 --steps 3",
+    "flood of blocks": "run monoliths --run-geo --set uplift=flow --set time_unit=60 --set "
+    "storage=1e-12 --levels 30,44,20 --steps 2",
 }
 SCENES_3D = {
     pattern: "run dam --set dim=3 --set n_layers=2 --set thickness=9 --set hold_z=1 "
@@ -66,7 +71,18 @@ def found(check, folder, words):
 @pytest.mark.parametrize("name", SCENES)
 def test_water_and_jumps_are_those_of_the_run(written, name):
     assert found(water, *written(name)) == []
+    assert found(water_in_time, *written(name)) == []
     assert found(elasticity, *written(name)) == []
+
+
+def test_water_that_is_stored_is_replayed(written):
+    """Another unit of time, and with voids: a void that lost its water would show."""
+    folder, words = written("flood")
+    for changed in ("time_unit=3.1", "storage=1.02e-11", "pressure_min=0", "drain_x=9"):
+        name = changed.split("=")[0]
+        other = tuple(changed if word.startswith(f"{name}=") else word for word in words)
+        assert other != words
+        assert "p of the flow in time off" in "".join(found(water_in_time, folder, other)), name
 
 
 @pytest.mark.heavy

@@ -66,9 +66,11 @@ class TimeStep:
 @dataclass(frozen=True, kw_only=True)
 class FlowInTime(FlowSolution):
     """A solution at the end of a time step, with the water at the nodes: stored, voids, inflow in
-    the step, as in `StoredWater`.
+    the step, as in `StoredWater`. at_ends: pressure beyond the imposed one at the ends [Pa]: a dry
+    one may be higher than the imposed head.
     """
 
+    at_ends: Array
     volume: Array
     void: Array
     inflow: Array
@@ -80,6 +82,7 @@ class FlowInTime(FlowSolution):
         return FlowInTime(
             pressure=mean.pressure,
             systems=mean.systems,
+            at_ends=self.at_ends,
             volume=rest * self.volume + share * other.volume,
             void=rest * self.void + share * other.void,
             inflow=rest * self.inflow + share * other.inflow,
@@ -154,6 +157,7 @@ class WaterBalance:
                             inverse_of=partial(self.inverse_of, ground, fixed),
                         )
                     ],
+                    at_ends=(total - imposed)[self.flow.fields.ends],
                     volume=self.volume + self.storage * pressure - void,
                     void=void,
                     inflow=inflow,
@@ -163,6 +167,7 @@ class WaterBalance:
         return FlowInTime(
             pressure=nothing[self.flow.inside],
             systems=[],
+            at_ends=nothing[self.flow.fields.ends],
             volume=nothing,
             void=nothing,
             inflow=nothing,

@@ -385,6 +385,8 @@ class WaterSystem:
         """The pressure of flowing water beyond the imposed one at all nodes."""
         pressure = np.zeros(self.fields.nodes)
         pressure[self.fields.inside] = solution.pressure
+        if isinstance(solution, FlowInTime):
+            pressure[self.fields.ends] = solution.at_ends
         return pressure
 
     def solve(
