@@ -128,7 +128,7 @@ def with_transient(scene: RandomQuake, rng: RandomNumbers) -> RandomQuake:
     waters = set(np.ravel(scene.settings["uplift"]))
     if not rng.event(0.5) or "flow" not in waters or "cracked" in waters:
         return scene
-    drawn = {"quake_uplift": "transient", "storage": rng.log_uniform(1e-13, 1e-10)}
+    drawn: Drawn = {"quake_uplift": "transient", "storage": rng.log_uniform(1e-13, 1e-10)}
     return replace(scene.changed(**drawn), checks=())
 
 
