@@ -99,3 +99,29 @@ def test_refused(command):
     words = "run", "dam", "--engine", "getdp", "--set", "uplift=flow", "--set", "turbulent=1"
     code, out, error = command(*words)
     assert (code, out) == (2, "") and "turbulent = 1: must be 0 with engine = getdp" in error
+
+
+def test_closing_stress_narrows_the_joint():
+    """w = aperture_min + max(0, w_0 + delta_n): its cubic flow, and its derivative."""
+    settings = FILM | {"turbulent": 0.0, "aperture_min": 1e-6, "aperture_elastic": 2e-5}
+    model = Model(load("dam", settings, (30.0,)))
+    (system,), variables = model.equilibrium.flowing, model.start().variables
+    (water,) = system.members
+    jump, loading = wedge(model, -2.5e-5), Loading(30.0, 0.0)
+    widths = 1e-6 + np.maximum(2e-5 + system.flow.opening @ jump, 0)
+    assert widths.min() == 1e-6 and widths.max() > 1.4e-5  # closed at the heel
+    of_points = system.flow.points.weights * widths**3 / (12 * VISC)
+    means = np.bincount(system.flow.points.elements, of_points) / system.flow.lengths
+    flux = DENSITY * 30 * WATER / (system.flow.lengths / means).sum()
+    assert water.pressure(jump, variables, loading).flux == pytest.approx(flux, rel=1e-9)
+    solution = system.solve(jump, variables, loading)
+    derivative = system.derivative(jump, variables, solution, None)
+    way = np.random.default_rng(1).normal(size=len(jump)) * 1e-12
+    above, below = (system.solve(jump + s * way, variables, loading).pressure for s in (1, -1))
+    expected = derivative.pressure @ way[derivative.columns]
+    assert (above - below) / 2 == pytest.approx(expected, abs=1e-5 * np.abs(expected).max())
+
+
+def test_a_storage_that_cannot_be():
+    with pytest.raises(InputError, match="storage = 1: must be at most"):
+        load("dam", FILM | {"storage": 1.0})

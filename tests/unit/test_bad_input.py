@@ -53,6 +53,7 @@ LIFTS = "--set", "lift_heights=15,30", "--set", "uplift=drained"
         ("visc=0", "> 0"),
         ("time_unit=-1", ">= 0"),
         ("storage=-1e-9", ">= 0"),
+        ("aperture_elastic=-1e-5", ">= 0"),
         ("pressure_min=-2e5", ">= -100000"),
         ("pressure_min=1", "<= 0"),
         ("aperture_min=0", "> 0"),

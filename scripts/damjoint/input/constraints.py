@@ -395,6 +395,11 @@ def check_time(case: ParameterValues) -> None:
             )
         if case["uplift"] == "cracked":
             raise InputError("quake_uplift = transient: must be another with uplift = cracked")
+    if case["uplift"] == "flow" and case["storage"] * case["rho_water"] * case["g"] > 1:
+        raise InputError(
+            f"storage = {case['storage']:g}: must be at most 1 / (rho_water g) (a metre of head "
+            "would store more than a metre of water)"
+        )
     if not flows_in_time(case):
         return
     unit = f"time_unit = {case['time_unit']:g}: must be 0"

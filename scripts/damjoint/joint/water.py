@@ -171,7 +171,8 @@ class JointWater:
         """Aperture at the law's points over that of the closed joint, and its derivative with the
         opening.
 
-        flow: cubic law. cracked: the same, but of the opening beyond that of a crack, and bounded
+        flow: cubic law, of the opening beyond that at which closing stress has narrowed the joint
+        to `aperture_min`. cracked: the same, but of the opening beyond that of a crack, and bounded
         where an open point has practically the full head. Others: closed, whatever the opening.
         """
         if not flows(self.case):
@@ -181,6 +182,8 @@ class JointWater:
         if self.case["uplift"] != "flow":
             most = self.case.shared["crack_most"][0]
             opening = opening - self.law.opening_of_crack(variables, len(opening))
+        elif self.case["aperture_elastic"]:
+            opening = opening + self.case["aperture_elastic"]
         wider = np.maximum(opening, 0) / narrowest
         factor = 1 + np.minimum(wider, most)
         growing = (wider > 0) & (wider < most)

@@ -55,6 +55,10 @@ def check_joint(joint: Case) -> None:
         )
     if joint["turbulent"] and joint["uplift"] == "flow":
         raise InputError("turbulent = 1: must be 0 with engine = getdp (cubic law)")
+    if joint["aperture_elastic"] and joint["uplift"] == "flow":
+        raise InputError(
+            f"aperture_elastic = {joint['aperture_elastic']:g}: must be 0 with engine = getdp"
+        )
     if freezes_uplift(joint):
         raise InputError(
             f"quake_uplift = {joint['quake_uplift']}: must be crack with engine = getdp and "
