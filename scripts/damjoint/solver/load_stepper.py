@@ -14,7 +14,7 @@ from ..model.loads import Loading, Unknown
 from ..model.results import Results
 from .controls import Control, DissipationControl, LevelControl, drive_of, work_of
 from .history import History
-from .model import Attempt, Model, StepResult
+from .model import Model, StepResult, StepStrategy
 from .path import PRECISION, ROUGH, SURE, EquilibriumPath, Point
 from .relaxation import over_unstable_growth
 from .state import State, Trace
@@ -248,7 +248,9 @@ class LoadStepper:
             self.state,
             time,
             self.control(time),
-            Attempt(strategies[:1] if quick else strategies, extrapolate=True, persist=smallest),
+            StepStrategy(
+                strategies[:1] if quick else strategies, extrapolate=True, persist=smallest
+            ),
         )
 
     def moves_pressure(self, step: StepResult) -> bool:
@@ -270,7 +272,7 @@ class LoadStepper:
         step = None
         if self.mechanism is None:
             control, fallback = self.control(target), self.model.strategies[-1:]
-            step = self.model.advance(self.state, target, control, Attempt(fallback))
+            step = self.model.advance(self.state, target, control, StepStrategy(fallback))
             self.end_of_solution = "" if step else self.model.end_of_solution
         self.stopped = step is None
         return step
@@ -347,7 +349,7 @@ class LoadStepper:
             jump = last.state.jump + share * (jump - last.state.jump)
         strategies = self.model.strategies[:FROM_PATH]
         control = LevelControl(level)
-        attempt = Attempt(strategies, guess=(jump, level))
+        attempt = StepStrategy(strategies, guess=(jump, level))
         step = self.model.advance(last.state, time, control, attempt)
         if step is None:
             return None

@@ -59,7 +59,7 @@ class StepResult:
 
 
 @dataclass(frozen=True)
-class Attempt:
+class StepStrategy:
     """How a step is solved."""
 
     #: those of the model by default; the first one that converges ends the attempt
@@ -99,7 +99,7 @@ class Begun:
             return problem
         return problem.with_constant_lift(self.constant_lift)
 
-    def solve(self, control: Control, attempt: Attempt) -> StepResult | None:
+    def solve(self, control: Control, attempt: StepStrategy) -> StepResult | None:
         """Solve it by the first strategy of an attempt that converges; None if none does."""
         model, state, time, tried = self.model, self.state, self.time, attempt.strategies
         starts = [
@@ -276,15 +276,15 @@ class Model:
         )
 
     def advance(
-        self, state: State, time: float, control: Control, attempt: Attempt | None = None
+        self, state: State, time: float, control: Control, attempt: StepStrategy | None = None
     ) -> StepResult | None:
         """A step from a state to a time; None if no strategy converges."""
-        return self.begin(state, time).solve(control, attempt or Attempt())
+        return self.begin(state, time).solve(control, attempt or StepStrategy())
 
     def advance_by_first(self, state: State, time: float, control: Control) -> StepResult | None:
         """A step by the first strategy only, from the extrapolation of the last two states."""
         first = self.strategies[:1]
-        return self.advance(state, time, control, Attempt(first, extrapolate=True))
+        return self.advance(state, time, control, StepStrategy(first, extrapolate=True))
 
     def predict(
         self, state: State, time: float, control: Control, extrapolate: bool
