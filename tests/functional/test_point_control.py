@@ -104,6 +104,7 @@ def test_both_engines_follow_two_snap_backs(tmp_path):
         ({"drive_load": "quake", "k_h": 0.1, "drive_end": 1.5}, "drive_end = 1.5: must be 2"),
         ({"drive_load": "ice"}, "drive_load"),
         ({"drive_direction": "z"}, "drive_direction"),
+        ({"traction_y": 1e4}, "traction_y = 10000: must be 0 but with a geometry of one's own"),
         ({"drive": "dissipation"}, "drive_load = level: must be force or traction"),
         (
             {"drive": "dissipation", "drive_load": "force", "force_x": 1.0},

@@ -99,6 +99,12 @@ def check_values(
     if by_parameters:
         check_strain(case, case["dam_height"])
         check_section(case, section)
+        for name in STAGED["traction"]:
+            if case[name]:
+                raise InputError(
+                    f"{name} = {case[name]:g}: must be 0 but with a geometry of one's own that has "
+                    "the region traction"
+                )
         check_distances(case, section["joint_along"][0])
     elif case["temperature_linear"]:
         raise InputError(

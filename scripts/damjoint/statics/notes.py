@@ -22,7 +22,7 @@ from ..mesh.user_geometry import LOWEST
 #: Parameters of the section and its mesh that a user's .geo file may use and a mesh does not.
 OF_SECTION = (
     *(n for n in GEOMETRY if n not in ("dim", "n_joint")),
-    *("ice_level", "force_face", "force_at", "anchor_at"),
+    *("ice_level", "force_face", "force_at", "anchor_at", "drive_face", "drive_at"),
 )
 #: Names of the faces, for messages.
 FACES = {
