@@ -43,3 +43,10 @@ def test_the_command_prints_a_row_for_each_joint_and_what_is_refused(command):
 def test_only_stiffnesses_that_are_named_repeat_the_run():
     assert stiffness.named_in("mu, K_T,K_N") == ["K_N", "K_T"]
     assert stiffness.named_in("all") == stiffness.named_in("") == []
+
+
+def test_a_wide_table_says_what_the_stiffnesses_mean(command):
+    words = "run", "a", "--no-picture", "--no-fields"
+    _, wide, _ = command(*words, "--wide")
+    assert "K_N = 1e+12, K_T = 1e+12 Pa/m: the weight of the dam closes the joint by" in wide
+    assert "K_N h/E" not in command(*words)[1]

@@ -52,6 +52,7 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
     from ..statics.hints import hints
     from ..statics.statement import path_statement, statement
     from ..statics.verdict import failed, verdict
+    from ..studies import stiffness
 
     case = load_case(arguments, arguments.case)
     out = arguments.out or Path("out") / case.name
@@ -81,11 +82,11 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
         lines = [*hints(result), result.info.get("error_estimate", {}).get("statement", "")]
         if any(lines):
             say("", *filter(None, lines))
-        if arguments.sensitivity and result.last:
-            from ..studies import stiffness
-
-            if repeated := stiffness.named_in(arguments.sensitivity):
-                runs = stiffness.repetitions(result.case, result, repeated, arguments.engine)
-                say("", stiffness.meaning(result.case), *stiffness.lines(list(runs)))
+        repeated = stiffness.named_in(arguments.sensitivity or "")
+        if (repeated or arguments.wide) and result.last:
+            say("", stiffness.meaning(result.case))
+        if repeated and result.last:
+            runs = stiffness.repetitions(result.case, result, repeated, arguments.engine)
+            say(*stiffness.lines(list(runs)))
         code = max(code, int(failed(result)))
     return code
