@@ -20,6 +20,7 @@ from damjoint.dynamics.frames import MOST_FRAMES
 from damjoint.input.parameters import declared
 from damjoint.laws import COLUMNS
 from damjoint.model.results import (
+    FILM,
     FLUX,
     HISTORY,
     IN_TIME,
@@ -93,7 +94,7 @@ def results_page() -> str:
     joint, history, steps, check, loads, critical, quake, modes = (
         markdown([(f"`{n}`", u, m) for n, (u, m) in columns.items()], ("column", "unit", "meaning"))
         for columns in (
-            JOINT | COLUMNS | FLUX | THICKNESS,
+            JOINT | COLUMNS | FLUX | FILM | THICKNESS,
             HISTORY | LATERAL | IN_TIME,
             STEPS,
             CHECK,
@@ -112,7 +113,8 @@ def results_page() -> str:
         "A row per joint node and requested level, sorted by level, joint, x and z; with order 2 "
         "the midpoints of edges and rectangles, too. Stresses are those of the joint law at the "
         "node, with internal variables of its own. `lambda` is written with law = friction only, "
-        "`flux` with uplift = flow only; of several joints, those without it have nan.",
+        "`flux` with uplift = flow only, `void_fraction` and `Re` with `time_unit` > 0 only; of "
+        "several joints, those without it have nan.",
         joint,
         "## history.csv",
         "A row per converged step. Forces are per metre of thickness, in 3D too. Of several "

@@ -149,6 +149,9 @@ def test_mass_is_kept_in_every_step(unit, lowest):
     assert balance == pytest.approx(start, abs=1e-11 * history["water"].max())
     assert history["p_min"].min() >= lowest - 1e-6
     assert (history["void"] >= 0).all()
+    void = result.joint["void_fraction"]
+    assert 0 <= void.min() and void.max() <= 1 and (void.max() > 0) == (history["void"][-1] > 0)
+    assert result.joint["Re"].max() <= history["Re"].max() * (1 + 1e-12)
     if unit == 1:
         assert history["void"].max() > 1e-7 and history["p_min"].min() == pytest.approx(lowest)
 

@@ -11,7 +11,7 @@ from ..arrays import Array, IntArray, Table
 from ..input.scene import numbered
 from ..laws import COLUMNS, Law
 from ..mesh.body import Body
-from .results import FLUX, THICKNESS, Results
+from .results import FILM, FLUX, THICKNESS, Results
 
 
 @dataclass
@@ -61,7 +61,7 @@ OF_JOINT = {
     "p": ("Pa", ("p",)),
     "damage": ("-", ("damage",)),
     "slip": ("m", ("slip",)),
-    **{name: (unit, (name,)) for name, (unit, _) in (COLUMNS | FLUX | THICKNESS).items()},
+    **{name: (unit, (name,)) for name, (unit, _) in (COLUMNS | FLUX | FILM | THICKNESS).items()},
 }
 
 

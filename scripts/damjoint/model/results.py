@@ -37,6 +37,11 @@ JOINT = {
 }
 #: Additional column where water flows.
 FLUX = {"flux": ("kg/(m s)", "mass flux towards the toe, mean of the elements around the node")}
+#: Further columns of flow in time.
+FILM = {
+    "void_fraction": ("-", "part of the aperture that is not filled with water"),
+    "Re": ("-", "Reynolds number of the flow, 2 flux / visc"),
+}
 
 #: Additional column where the joint is grouted or sawn.
 THICKNESS = {"joint_thickness": ("m", "thickness that grout adds and the saw takes off (< 0)")}
@@ -307,12 +312,15 @@ def joint_columns(case: Case) -> Columns:
     flow = FLUX if any(joint["uplift"] == "flow" for joint in case.joints) else {}
     worked = any(joint["grout_pressure"] or joint["saw_thickness"] for joint in case.joints)
     works = THICKNESS if worked else {}
-    return functools.reduce(operator.or_, [JOINT, *of_laws, flow, works])
+    film = FILM if any(map(flows_in_time, case.joints)) else {}
+    return functools.reduce(operator.or_, [JOINT, *of_laws, flow, film, works])
 
 
 def step_columns(case: Case) -> Columns:
     """The columns of a case's steps.csv: unit and meaning."""
-    further = {n: column for n, column in joint_columns(case).items() if n not in JOINT | FLUX}
+    further = {
+        n: column for n, column in joint_columns(case).items() if n not in JOINT | FLUX | FILM
+    }
     return STEPS | further
 
 

@@ -19,6 +19,7 @@ from ..joint.water import Pressure
 from ..laws import Law
 from ..model.loads import Unknown
 from ..model.results import (
+    FILM,
     HISTORY_OF_JOINTS,
     IN_TIME,
     THICKNESS,
@@ -157,6 +158,22 @@ class JointState:
             return dict.fromkeys(IN_TIME, 0.0)
         return water.in_time(self.state.stored[flowing.index(water.system)], self.pressure)
 
+    @property
+    def film(self) -> dict[str, Array]:
+        """The columns FILM at the locations; zero without flowing water. What air a dry end has
+        drawn in counts up to its aperture.
+        """
+        joint, water = self.joint, self.equilibrium.water[self.number]
+        flowing, stored = self.equilibrium.flowing, self.state.stored
+        none = np.zeros(len(joint.space.locations))
+        if water.system not in flowing or not stored or self.pressure.flux is None:
+            return dict.fromkeys(FILM, none)
+        of_system = stored[flowing.index(water.system)]
+        share = np.minimum(of_system.void / water.system.volume(self.state.jump), 1)
+        number = 2 * np.abs(node_means(joint, self.pressure.flux)) / water.case["visc"]
+        at_nodes = joint.fields.at_locations @ share[water.nodes]
+        return dict(zip(FILM, (at_nodes, number), strict=True))
+
     def table(self) -> tuple[Array, Array]:
         """Its rows, node by node, columns `joint_columns` but for sigma_n_eff; and the same with
         jump and stress extrapolated from the Gauss points.
@@ -185,6 +202,8 @@ class JointState:
         columns |= {name: joint.mean_at_nodes(of_law[name]) for name in law.columns}
         if pressure.flux is not None:
             columns["flux"] = node_means(joint, pressure.flux)
+        if FILM.keys() & joint_columns(case.joints[self.number]).keys():
+            columns |= self.film
         stress = self.traction.copy()
         stress[:, 0] -= pressure.points
         extrapolated = {name: columns[name].copy() for name in JUMP_AND_STRESS}
