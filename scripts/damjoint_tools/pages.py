@@ -168,8 +168,11 @@ def results_page() -> str:
         "history.csv; `failed` (1 where `damjoint run` ends with exit code 1), `verdict`, "
         "`statement`; with `--critical` the critical value, its `mode`, whether it is `confirmed` "
         "and by what; with `--quake` `peak_ground_ax` [m/s2], `residual_slip` [m], "
-        "`residual_tilt` (both empty if the dam is not at rest), `rigid_block_slip` [m]. In a "
-        "sample, a row whose loads exceed the largest possible strength of the joint is not "
+        "`residual_tilt` (both empty if the dam is not at rest), `rigid_block_slip` [m], "
+        "`end_slip` [m], `peak_opening` [m], of the ground motion along x also `peak_ground_vx` "
+        "[m/s], Arias' intensity `arias_x` [m/s] and `spectral_ax` [m/s2], the spectral "
+        "acceleration at the dam's first period with a damping of 5 %. In a sample, "
+        "a row whose loads exceed the largest possible strength of the joint is not "
         "computed; its `statement` gives this reason. Further files:",
         "- `_probability.csv`: probability of failure with the interval of Clopper and Pearson. "
         "Rows without a result are `undecided`; they count as failures, except for the lower "
@@ -179,18 +182,23 @@ def results_page() -> str:
         "earthquakes, over the rows at rest, with `residual_slip` and `residual_tilt`.\n"
         "- `_sobol.csv`, with `--design sobol`: `outcome`, `input`, Sobol's `first`-order and "
         "`total` index, each with half the width of its 95 % interval.\n"
+        "- `_fragility.csv` and `.png`, with `--quake`: of each limit `median` of the intensity "
+        "with its 95 % interval and `dispersion` of the lognormal curve, numbers of rows, `reason` "
+        "where there is no curve.\n"
         "- `.png`: a chart of one or two varied parameters, or of the sample.",
         "## sensitivity.csv",
-        "Written by `damjoint run --sensitivity` and `damjoint critical --sensitivity`, a row per "
-        "parameter and level: `parameter`, its `unit` and `value`, the level [m], `kink` (1: a "
+        "Written by `damjoint run --sensitivity`, `check` and `critical`, a row per parameter and "
+        "level: `parameter`, its `unit` and `value`, the level [m], `kink` (1: a "
         "point of the joint is about to open, to slip or to break, and the derivative towards the "
-        "other side differs), and the derivatives, in SI units per unit of the parameter, of the "
-        "columns of history.csv or of `critical_level`.",
+        "other side differs), `of_runs` (1: of the geometry, by two runs), and the derivatives, in "
+        "SI units per unit of the parameter, of columns of history.csv, of `SSF`, `OSF` and of "
+        "`crack_end`, the end of the crack from the heel [m], or of `critical_level`.",
         "## reliability.csv",
         "Written by `damjoint reliability`, a row per critical level: `key`, by which an "
         "interrupted study continues; `of_joint`, the only joint that can fail (empty: all); the "
         "varied values; the critical level [m], its `mode`, the `joint` that fails, whether it is "
-        "`confirmed` and by what. `run.json` has the results under `reliability`; "
+        "`confirmed` and by what, its derivatives `d_...` with the parameters where FORM and SORM "
+        "have asked for them. `run.json` has the results under `reliability`; "
         "`design_point.case` is the case of the design point.",
         "## calibration.csv, residuals.csv",
         "Written by `damjoint calibrate`. A row per free parameter: `parameter`, `unit`, `start`, "

@@ -13,7 +13,7 @@ import pytest
 from damjoint import RunError
 from damjoint.dynamics.frames import MOST_FRAMES, Frames, frame_interval
 from damjoint.dynamics.history import QuakeHistory
-from damjoint.dynamics.record import read
+from damjoint.dynamics.record_files import read
 from damjoint.dynamics.scheme import Motion
 from damjoint.dynamics.step import TimeStep
 from damjoint.fem import factor
@@ -34,7 +34,7 @@ from damjoint.studies import (
     quake_summary,
     sweep,
 )
-from damjoint.studies.plan import Plan
+from damjoint.studies.plan import Limits, Plan
 from damjoint.studies.quake import QuakeRun
 from matplotlib.text import Text
 from quakes import BLOCK, DAM, earthquake, joint_of, mean_slip, smooth_record, write_record
@@ -595,14 +595,14 @@ def test_several_records_in_several_processes(command, case_file, tmp_path, reco
 
 def test_the_table_of_several_records_fits_the_terminal():
     """Of long names and verdicts; what has no room is named."""
-    numbers = dict.fromkeys(quake_study.QUAKE_COLUMNS, -0.0012345)
+    numbers = dict.fromkeys(quake_summary.QUAKE_COLUMNS, -0.0012345)
     row = {"folder": "irpinia_1980_sturno_090", "verdict": "sliding on lift 12.5 m"} | numbers
     results = [SimpleNamespace(row=row)] * 2
     widest = quake_study.records_table(results).split("\n")
     assert "block [m]" in widest[1] and max(map(len, widest)) > 80
     lines = quake_study.records_table(results, 80).split("\n")
-    assert max(map(len, lines)) <= 80 and lines[-1].endswith("rigid_block_slip)")
-    assert row["folder"] in lines[-2] and row["verdict"] in lines[-2]
+    assert max(map(len, lines)) <= 80 and "rigid_block_slip" in lines[-2]
+    assert row["folder"] in lines[-3] and row["verdict"] in lines[-3]
 
 
 def test_earthquakes_that_are_finished_are_not_computed_again(
@@ -798,7 +798,7 @@ def test_a_dam_that_flies_away_does_not_stand(command, case_file):
 @pytest.mark.usefixtures("no_pictures")
 def test_notes_come_before_the_numbers(command, case_file):
     """Steps that do not resolve the first period; an offset of the record."""
-    rows, _ = read(smooth_record(Path("wave.csv"), 5.0, duration=0.5, frequency=4.0))
+    rows = read(smooth_record(Path("wave.csv"), 5.0, duration=0.5, frequency=4.0)).rows
     write_record(Path("wave.csv"), rows[:, 0], rows[:, 1] + 0.3)
     _, out, _ = command("quake", case_file, *LONG_STEPS)
     assert [line.startswith("note: ") for line in out.splitlines()[:5]].count(True) == 2
@@ -1018,6 +1018,53 @@ def test_a_sweep_of_earthquakes(command, case_file, tmp_path):
     assert "2 rows computed" in command(*words, "--quake", "0.5")[1]
     code, _, err = command(*words, "--quake", "0")
     assert code == 2 and "--quake 0: must be a slip > 0 m" in err
+    assert command("sweep", "dam", "--both-signs", "--vary", "mu=0.8")[0] == 2
+
+
+@pytest.mark.heavy
+@pytest.mark.usefixtures("no_pictures")
+def test_the_fragility_of_a_block_is_that_of_newmarks_slips(command, tmp_path):
+    """Two half sines, one of them in the format of PEER, each in both signs at three scales: the
+    slips are the closed form, and so are the numbers beyond each limit. Rows of a sweep with
+    further records are computed alone.
+    """
+    seconds = {"a.csv": 0.3, "b.AT2": 0.2}
+    waves = {n: 5 * np.sin(np.pi * np.arange(0, t + 1e-9, 0.0025) / t) for n, t in seconds.items()}
+    write_record(tmp_path / "a.csv", 0.0025 * np.arange(len(waves["a.csv"])), waves["a.csv"])
+    head = ["PEER", "b", "ACCELERATION TIME SERIES IN UNITS OF G", f"NPTS= {len(waves['b.AT2'])},"]
+    lines = [*head[:3], f"{head[3]} DT= .0025 SEC", *(f"{v / 9.80665:.9e}" for v in waves["b.AT2"])]
+    (tmp_path / "b.AT2").write_text("\n".join(lines))
+    words = ["sweep", "dam", *(w for n, v in BLOCK.items() for w in ("--set", f"{n}={v}"))]
+    words += ["--levels", "0", "--set", "dt=0.0025", "--jobs", "1", "--both-signs"]
+    words += [
+        "--quake",
+        "slip=0.01,slip=0.03",
+        "--vary",
+        "record_scale=0.9,1.4,2",
+        "--out",
+        "f.csv",
+    ]
+    code, out, _ = command(*words, "--record", "a.csv")
+    assert code == 0 and "6 rows computed" in out
+    code, out, _ = command(*words, "--record", "a.csv", "--record", "b.AT2")
+    assert code == 0 and "6 rows computed" in out
+    rows = list(csv.DictReader((tmp_path / "f.csv").read_text().splitlines()))
+    assert len(rows) == 12
+    for row in rows:
+        scale = float(row["record_scale"])
+        peak, time = 5 * abs(scale), seconds[row["record"]]
+        assert float(row["peak_ground_ax"]) == pytest.approx(peak, rel=1e-6)
+        assert float(row["peak_ground_vx"]) == pytest.approx(2 * peak * time / np.pi, rel=1e-3)
+        arias = np.pi / (2 * 9.80665) * peak**2 * time / 2
+        assert float(row["arias_x"]) == pytest.approx(arias, rel=1e-3)
+        slip = 0.0 if peak < 0.5 * G else -np.sign(scale) * half_sine_slip(peak, 0.5, time)
+        assert float(row["residual_slip"]) == pytest.approx(slip, rel=2e-3, abs=2e-6)
+        assert float(row["failed"]) == (abs(slip) > 0.01)
+    table = list(csv.DictReader((tmp_path / "f_fragility.csv").read_text().splitlines()))
+    assert [r["limit"] for r in table][:2] == ["residual slip > 10 mm", "residual slip > 30 mm"]
+    numbers = [sum(abs(float(r["residual_slip"])) > v for r in rows) for v in (0.01, 0.03)]
+    assert [float(r["exceed"]) for r in table] == [*numbers, 0]
+    assert "no row exceeds it" in table[2]["reason"] and "Fragility, lognormal in peak_" in out
 
 
 def quake_rows(name, values, slips, verdicts):
@@ -1053,7 +1100,9 @@ def test_the_chart_of_earthquakes_shows_their_slip(monkeypatch):
     scales = [1.0, 2.0, 3.0]
     verdicts = ["stands", "residual slip", "not at rest"]
     rows = quake_rows("record_scale", scales, [-0.02, 0.08, None], verdicts)
-    panels = drawn_panels(monkeypatch, Plan({"record_scale": scales}, {}, {}, "", 0.05), rows)
+    panels = drawn_panels(
+        monkeypatch, Plan({"record_scale": scales}, {}, {}, "", Limits((0.05,))), rows
+    )
     assert set(panels) == {
         "residual slip [mm]",
         "residual tilt [µrad]",
@@ -1073,7 +1122,7 @@ def test_statistics_of_earthquakes_are_those_of_their_slip(monkeypatch):
     draws = [0.6, 0.7, 0.8, 0.9]
     slips, verdicts = [0.3, 0.2, 0.1, None], [*3 * ["residual slip"], "not at rest"]
     rows = quake_rows("mu", draws, slips, verdicts)
-    plan = Plan({}, {"mu": draws}, {}, "", 0.05)
+    plan = Plan({}, {"mu": draws}, {}, "", Limits((0.05,)))
     (row,) = outcome.sensitivities(plan, rows)
     assert row["residual_slip"] == pytest.approx(-1) and "max_opening" not in row
     (share,) = outcome.probabilities(plan, rows)
@@ -1085,19 +1134,28 @@ def test_statistics_of_earthquakes_are_those_of_their_slip(monkeypatch):
 def test_a_row_is_judged_by_its_slip_at_rest(monkeypatch):
     """Not at rest: by the slip at the end, or undecided."""
     case, found = values_of(2.0)
-    found |= {"peaks": {"ground_ax": {"value": -2.0}}, "after": {"equilibrium": True}}
+    found |= {"ground": dict.fromkeys(quake_summary.INTENSITIES, 2.0)}
+    found |= {"after": {"equilibrium": True}, "peaks": {}}
+    for name, value in (("heel_opening", 1e-3), ("toe_opening", -1e-3)):
+        found["peaks"][name] = {"value": value}
     static = SimpleNamespace(results=lambda: SimpleNamespace(last={}))
     monkeypatch.setattr(sweep.quake, "outcome_of", lambda case: (static, found))
-    judged = lambda limit: sweep.quake_row(sweep.Task(case, False, slip_limit=limit))
+    judged = lambda *slips: sweep.quake_row(sweep.Task(case, False), Limits(slips, (0.002,)))
     assert (judged(0.05)["verdict"], judged(0.05)["failed"]) == ("stands", 0)
     assert judged(0.005)["verdict"] == "residual slip"
     assert judged(0.005)["residual_slip"] == pytest.approx(0.01, rel=1e-3)
+    assert judged(0.05, 0.005)["verdict"] == "residual slip"
+    assert judged(0.005)["peak_opening"] == 1e-3
     _, moving = values_of(2.0, slip=0.5)
     found |= moving
     row = judged(0.05)
     assert (row["verdict"], row["failed"], row["residual_slip"]) == ("not at rest", 1, "")
     assert "not at rest" in row["statement"] and "limit 50 mm" in row["statement"]
     assert judged(0.01)["verdict"] == "residual slip"
+    found["peaks"]["heel_opening"]["value"] = 3e-3
+    assert judged()["verdict"] == "opening"
+    found["after"]["equilibrium"] = False
+    assert judged(0.05)["verdict"] == "no equilibrium"
     assert {"not at rest", "broken without friction"} <= set(sweep.UNDECIDED)
 
 

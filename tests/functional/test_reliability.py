@@ -69,7 +69,8 @@ def test_form_and_sorm_of_a_dam_that_slides(trial):
 def test_form_and_sorm_need_few_critical_levels():
     case = dj.case("dam", levels=[30, 36], **SLIDES)
     result = dj.reliability(case, **VARIED, samples=0, jobs=1)
-    assert result.levels.computed <= 60
+    assert result.levels.computed <= 15  # 60 allowed; 38 by differences
+    assert result.beta == pytest.approx(2.6919, abs=1e-4)
     assert np.isnan(result.rows.sampled).all() and result.words == [""]
 
 
@@ -134,21 +135,47 @@ def test_three_joints_against_closed_form_samples():
 
 
 def test_samples_around_the_design_point_are_unbiased():
-    """The mean of 40 studies with closed-form levels; the probability is that of 2e7 samples."""
+    """The mean of 200 studies with closed-form levels, and how many of their intervals have the
+    probability: that of 2e7 samples. Of 95 %, 180 to 198 of 200 in 99.8 % of such tests.
+    """
 
     class ClosedForm(reliability.CriticalLevels):
-        def of(self, joint, rows):
+        def rates(self, joint, row):
+            return None
+
+        def of(self, joint, rows, rates=False):
             return [{"critical_level": slide_level(r["mu"], r["rho_dam"], 0)} for r in rows]
 
     variables = reliability.Variables(VARIED)
     levels = ClosedForm(dj.case("dam", levels=[30, 36], **SLIDES), variables)
     limit, normal = reliability.LimitState(levels), variables.normal()
     design = reliability.design_point(limit, normal, [0.0] * 3)
-    studies = [reliability.sampled(limit, normal, [design], 200, seed) for seed in range(40)]
+    studies = [reliability.sampled(limit, normal, [design], 100, seed) for seed in range(200)]
     shares = np.array([share for share, _, _ in studies])
     mean_error = shares.std(ddof=1) / len(shares) ** 0.5
     assert abs(shares.mean() - 4.459e-3) < 3 * mean_error < 0.1 * 4.459e-3
-    assert sum(low < 4.459e-3 < high for _, low, high in studies) >= 33  # of 40 of 95 %
+    assert sum(low < 4.459e-3 < high for _, low, high in studies) >= 180
+
+
+def test_derivatives_are_those_of_the_closed_form():
+    """Also through a tied parameter, and with correlated variables in one joint's limit state."""
+    case = dj.case("dam", levels=[30, 36], **SLIDES)
+    variables = reliability.Variables(
+        {"mu": MU, "level": "normal(38,1)"}, (), {"rho_dam": "2000*mu+900"}
+    )
+    levels = reliability.CriticalLevels(case, variables)
+    limit, z = reliability.LimitState(levels), [-0.8, 0.5]
+    slope = np.ravel(limit.gradient(z))
+    level_of = lambda mu: slide_level(mu, 2000 * mu + 900, 0)
+    mu, step = variables.values(z)["mu"], 1e-5
+    by_mu = (level_of(mu + step) - level_of(mu - step)) / (2 * step)
+    assert slope == pytest.approx([by_mu * mu * 0.119571287, -1.0], rel=1e-6)
+    assert levels.computed == 1
+
+
+def test_an_interval_without_a_failure_begins_at_zero():
+    share, low, high = reliability.weighted_share(np.full(50, 1e-3), np.zeros(50, bool))
+    assert (share, low) == (0, 0) and 3e-5 < high < 3e-4  # 3/50 samples of this weight: 6e-5
 
 
 def rows(path):

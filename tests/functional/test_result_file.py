@@ -12,7 +12,7 @@ from damjoint.input.resolve import load, varied
 from damjoint.mesh.mesh import mesh_of
 from damjoint.processes import ProcessKilled, pool_of
 from damjoint.studies import keys
-from damjoint.studies.plan import Plan
+from damjoint.studies.plan import Limits, Plan
 from damjoint.studies.result_file import result_file
 from damjoint.studies.sweep import key_of
 from own_mesh import OwnMesh
@@ -81,7 +81,7 @@ def test_the_key_of_a_geometry_follows_the_values_and_files_that_it_uses(tmp_pat
         ({"pena_tang": 0.0}, {}),  # set to its default: the dam then stands on the hardening
         ({}, {"sampled": {"mu": [0.5]}}),  # rows that statics decides have no columns
         ({}, {"critical": "level"}),
-        ({}, {"slip_limit": 0.1}),
+        ({}, {"quake": Limits((0.1,))}),
     ],
 )
 def test_what_else_decides_a_row_is_part_of_the_key(case, plan):

@@ -8,6 +8,7 @@ import damjoint as dj
 import numpy as np
 import pytest
 from closed_forms import WATER
+from damjoint.solver.derivatives import Side, history_row
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.studies import sensitivity
 from damjoint.studies.critical import Search
@@ -60,8 +61,10 @@ def test_the_critical_level_of_the_joint_that_fails():
 
 
 def history(case):
-    """The last row of history.csv of a run."""
-    return {n: column[-1] for n, column in LoadStepper(case).run().history.items()}
+    """The last row of history.csv of a run, with safety factors and the end of the crack."""
+    stepper = LoadStepper(case)
+    stepper.run()
+    return history_row(Side(stepper.model, stepper.state, stepper.history.at_rest))
 
 
 OF_LAWS = {
@@ -80,6 +83,7 @@ OF_UPLIFTS = {
 #: Columns that are compared, and their size [m], [N/m], [N]; a derivative is exact to 1e-6, or to
 #: 1e-9 of the size for a relative change of one.
 SIZES = {"crest_ux": 1e-2, "max_opening": 1e-3, "N": 1e7, "T": 1e7, "M": 1e8, "U": 1e7}
+SIZES |= {"crack_end": 1e2, "SSF": 1.0, "OSF": 1.0, "x_resultant": 1e2}
 EXACT, OF_SIZE = 1e-6, 1e-8
 
 
@@ -93,16 +97,22 @@ EXACT, OF_SIZE = 1e-6, 1e-8
 @pytest.mark.parametrize("law", OF_LAWS)
 def test_the_results_of_a_run_against_central_differences(law, uplift):
     """Of fourth order, of runs that are converged to round-off; joint cracked and slipping."""
-    weak = {"mu": 0.95, "adhesion": 5e4, "sigma_max": 5e4, "dam_base": 28, "tolerance": 1e-13}
+    weak = {"mu": 1.2, "adhesion": 4e4, "sigma_max": 3e4, "dam_base": 26, "tolerance": 1e-13}
     given = {"n_joint": 12, "order": 1, **weak, **OF_UPLIFTS[uplift]}
     case = dj.case("dam", levels=[20, 30, 38, 42], steps=2, law=law, uplift=uplift, **given)
     names = [*OF_LAWS[law], "rho_dam", "E_dam", *list(OF_UPLIFTS[uplift])[-2:-1]]
     rows = [row for row in sensitivity.of_run(case, names) if row.level == 42]
     assert [row.name for row in rows] == names
+    last = history(case)
+    if uplift != "none":  # the joint opens
+        assert last["max_opening"] > 5e-5 and (law == "friction") == (last["crack_length"] > 0)
+    if law == "friction":
+        assert abs(last["crack_end"] - last["crack_length"]) < 26 / 12
     for row in rows:
         step = 2e-5 * row.value
         at = {k: history(dj.case(case, **{row.name: row.value + k * step})) for k in (-2, -1, 1, 2)}
-        for column, size in SIZES.items():
+        for column in SIZES.keys() & row.derivatives.keys():
+            size = SIZES[column]
             wide, narrow = (at[k][column] - at[-k][column] for k in (2, 1))
             expected = (8 * narrow - wide) / (12 * step)
             allowed = OF_SIZE * size / row.value
@@ -117,6 +127,37 @@ def test_a_load_that_is_zero_has_a_derivative_on_its_side():
     weight = 2400 * 9.81 * 45 * (34 + 5) / 2
     assert rows["k_v"].derivatives["N"] == pytest.approx(-weight, rel=1e-6)
     assert rows["ice_force"].derivatives["T"] == pytest.approx(1, rel=1e-4)
+
+
+def test_the_geometry_by_two_runs():
+    """The resultants are linear in the width of the base, without a crack."""
+    case = dj.case("dam", levels=[20, 30], n_joint=10)
+    rows = sensitivity.of_run(case, sensitivity.names_of(case, "mu,dam_base", geometry=True))
+    of_mu, of_base = (
+        next(r for r in rows if (r.name, r.level) == (n, 30)) for n in ("mu", "dam_base")
+    )
+    assert of_base.of_runs and not of_mu.of_runs
+    assert of_base.derivatives["N"] == pytest.approx(
+        2400 * 9.81 * 45 / 2 - WATER * 30 / 2, rel=1e-6
+    )
+    assert of_base.derivatives["U"] == pytest.approx(WATER * 30 / 2, rel=1e-6)
+    last = history(case)
+    assert of_mu.derivatives["SSF"] == pytest.approx(last["N"] / last["T"], rel=1e-6)
+    assert abs(of_mu.derivatives["OSF"]) < 1e-9
+
+
+def test_the_factors_of_a_check(command, tmp_path):
+    words = "check", "dam", "--set", "n_joint=10", "--levels", "30", "--out", "out"
+    code, out, _ = command(*words, "--sensitivity", "mu,dam_base")
+    assert (
+        code == 0 and "dam, uplift imposed: Change by one percent" in out and "of two runs" in out
+    )
+    table = {r["parameter"]: r for r in rows_of(tmp_path / "out/dam/sensitivity.csv")}
+    row = next(r for r in rows_of(tmp_path / "out/check.csv") if "gravity" in r["answer"])
+    expected = float(row["N"]) / float(row["T"])
+    assert float(table["mu"]["SSF"]) == pytest.approx(expected, rel=1e-6)
+    assert command(*words, "--sensitivity", "mu,dam_base")[1] == out  # from the files
+    assert "Change by" not in command(*words)[1]
 
 
 def rows_of(path):
@@ -157,7 +198,8 @@ def test_the_table_of_a_critical_level(command, tmp_path, texts_drawn):
     [
         (["run", "dam", "--sensitivity", "mux"], "mux: unknown parameter"),
         (["run", "dam", "--sensitivity", "law"], "--sensitivity law: must be a parameter that is"),
-        (["run", "dam", "--sensitivity", "dam_height"], "neither of geometry, mesh nor solver"),
+        (["run", "dam", "--sensitivity", "h_dam"], "neither of geometry, mesh nor solver"),
+        (["critical", "dam", "--sensitivity", "dam_base"], "neither of geometry, mesh nor solver"),
         (["run", "dam", "--sensitivity", "mu,mu"], "must be NAME,NAME,... or all, each once"),
         (["run", "lifts", "--sensitivity", "mu"], "differs between the joints; must be of one"),
         (["run", "dam", "--sensitivity", "no.mu"], "--sensitivity no.mu: must be of a joint: base"),

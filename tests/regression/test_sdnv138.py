@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from damjoint.csr import CsrMatrix
-from damjoint.dynamics.record import read
+from damjoint.dynamics.record_files import read
 from damjoint.dynamics.scheme import HHT, Motion
 from damjoint.dynamics.stepper import Earthquake
 from damjoint.engines.condensed.recover import recover
@@ -104,7 +104,7 @@ def test_by_the_published_conventions(name):
     """
     case = TESTS[name].load()
     quake, static = computed(case, with_eight_functions if case["order"] == 2 else None)
-    (rows, _), begin = read(case.record), case["record_start"]
+    rows, begin = read(case.record).rows, case["record_start"]
     rows = rows[rows[:, 0] > begin - 1e-6]
     quake.record = replace(quake.record, times=rows[:, 0] - begin, acceleration=rows[:, 1:])
     if case["order"] == 1:  # B begins with the acceleration of equilibrium
@@ -153,7 +153,7 @@ def test_two_blocks_pressed_together(tmp_path):
     """Without Poisson's effect two blocks are a bar; the published numbers, 0.13 % below its, are
     between those of tetrahedra of order 1 of two sizes. Its direction is vertical here.
     """
-    rows = read(TESTS["B"].load().record)[0][:11]
+    rows = read(TESTS["B"].load().record).rows[:11]
     record = rows[:, 1] / 0.634568  # m/s2, as published
     path = write_record(tmp_path / "r.csv", rows[:, 0], 0 * record, -record)
     scene = {"dim": 3.0, "dam_base": 10.0, "dam_crest": 10.0, "dam_height": 10.0, "thickness": 1.0}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from damjoint.dynamics import ground_motion
-from damjoint.dynamics.record import STANDARD_GRAVITY
+from damjoint.dynamics.record_files import STANDARD_GRAVITY
 from numpy.testing import assert_allclose
 
 

@@ -5,7 +5,8 @@ import os
 import numpy as np
 import pytest
 from damjoint import InputError
-from damjoint.dynamics.record import MOST_STEPS, Record, read
+from damjoint.dynamics.record import MOST_STEPS, Record
+from damjoint.dynamics.record_files import read
 from damjoint.dynamics.rigid_block import RigidBlock
 from damjoint.input.resolve import load
 from quakes import write_record

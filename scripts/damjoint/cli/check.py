@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .cases import load_cases
 from .options import CASE, Parser, say, table_width
+
+if TYPE_CHECKING:
+    from ..input.case import Case
 
 SUMMARY = (
     "safety factors by finite elements and by the gravity method; exit code 1 if one is too "
@@ -29,6 +34,7 @@ def add(command: Parser) -> None:
         "not computed again (default: out/check)",
     )
     command.add_jobs()
+    command.add_sensitivity("the safety factors and of the results, sensitivity.csv of each case,")
 
 
 def call(arguments: argparse.Namespace) -> int:
@@ -37,11 +43,28 @@ def call(arguments: argparse.Namespace) -> int:
     from ..studies.check_study import check_cases
     from ..studies.check_tables import text_table
 
-    checks = check_cases(load_cases(arguments, arguments.cases), arguments.out, arguments.jobs)
+    cases, out = load_cases(arguments, arguments.cases), arguments.out
+    checks = check_cases(cases, out, arguments.jobs, arguments.sensitivity or "")
     errors = [f"{check.case.name}: {check.accuracy}" for check in checks if check.accuracy]
+    derived = changes_of(cases, out) if arguments.sensitivity else []
     say(
         "\n\n".join(
-            [text_table(checks, table_width(arguments)), *errors, str(arguments.out / "check.csv")]
+            [text_table(checks, table_width(arguments)), *errors, *derived, str(out / "check.csv")]
         )
     )
     return int(any(result.verdict in ("fail", NOT_JUDGED) for c in checks for result in c.results))
+
+
+def changes_of(cases: Sequence[Case], out: Path) -> list[str]:
+    """What the parameters change in each scene of cases, by its record below out."""
+    from ..post import folder as folders
+    from ..studies import sensitivity
+
+    texts = []
+    for scene in (scene for case in cases for scene in case.scenes()):
+        case = next(case for case in cases if case.name == scene.name)
+        info = folders.read_info(folders.scene_folder(case, scene, out / case.name)) or {}
+        if derived := info.get("sensitivity"):
+            words = derived["statement"] or sensitivity.text(derived["changes"])
+            texts.append(f"{scene.name}, uplift {scene['uplift']}: {words}")
+    return texts

@@ -54,19 +54,6 @@ def integer(name: str, text: str, least: int) -> int:
     return int(text)
 
 
-def slip(name: str, text: str) -> float:
-    """Return an argument as a length [m]. Raises InputError."""
-    from ..input.arithmetic import number
-
-    try:
-        value = number(text)
-    except ValueError:
-        value = 0.0
-    if not value > 0:
-        raise InputError(f"--{name} {text}: must be a slip > 0 m")
-    return value
-
-
 def time_span(name: str, text: str) -> tuple[float, float]:
     """Return an argument FIRST:LAST as two times [s]. Raises InputError."""
     from ..studies.quake import span_of

@@ -61,7 +61,7 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
     if arguments.sensitivity:
         from ..studies import sensitivity
 
-        names = sensitivity.names_of(case, arguments.sensitivity)
+        names = sensitivity.names_of(case, arguments.sensitivity, geometry=True)
         options["further"] = partial(sensitivity.write, names, picture)
     options |= {"engine": arguments.engine, "drawing": drawing}
     for result in run(case, out, fields, picture, **options):

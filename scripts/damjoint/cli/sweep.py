@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 
 from .. import InputError
 from .cases import load_case, print_note
-from .options import RESUMED, Checked, Parser, say, slip, table_width
+from .options import RESUMED, Checked, Parser, path, say, table_width
 
 if TYPE_CHECKING:
+    from ..arrays import Value
     from ..input.case import Case
     from ..studies.plan import Plan, Row
 
@@ -72,11 +73,32 @@ def add(command: Parser) -> None:
     )
     command.add_argument(
         "--quake",
-        metavar="SLIP",
+        metavar="LIMITS",
+        help="each row is an earthquake; it fails if the residual slip exceeds a limit [m], 0.05, "
+        "or another one, slip=0.05,slip=0.2,opening=0.01, or if the dam does not stand: a "
+        "fragility curve for each (default: none)",
+    )
+    command.add_argument(
+        "--record",
+        metavar="FILE",
         action=Checked,
-        convert=slip,
-        help="each row is the earthquake of the case's record; it fails if the residual slip "
-        "exceeds SLIP [m]: with --vary record_scale=... and --sample a fragility (default: none)",
+        convert=path,
+        repeats=True,
+        help="record of the rows of --quake, as in damjoint quake; repeatable: each row with each "
+        "record (default: that of the case)",
+    )
+    command.add_argument(
+        "--both-signs",
+        action="store_true",
+        help="also each record reversed: record_scale and its negative (with --quake)",
+    )
+    command.add_argument(
+        "--intensity",
+        choices=("peak_ground_ax", "peak_ground_vx", "arias_x", "spectral_ax"),
+        default="peak_ground_ax",
+        help="column that is the intensity of the fragility: largest acceleration or velocity of "
+        "the ground, Arias' intensity, spectral acceleration at the dam's first period (default: "
+        "peak_ground_ax)",
     )
     command.add_jobs()
     command.add_scheduler()
@@ -86,7 +108,7 @@ def add(command: Parser) -> None:
 def call(arguments: argparse.Namespace) -> int:
     """Run damjoint sweep."""
     from ..input import parameters
-    from ..studies.plan import plan_of, sample_of
+    from ..studies.plan import MOTION, Limits, in_both_signs, plan_of, sample_of
     from ..studies.sweep import PlannedRows, meshed, rows_table, sweep
 
     out = arguments.out or Path(f"{Path(arguments.case).stem}_sweep.csv")
@@ -95,9 +117,19 @@ def call(arguments: argparse.Namespace) -> int:
     if not arguments.sample and arguments.correlate:
         raise InputError(f"--correlate {arguments.correlate[0]}: needs --sample")
     sample = sample_of(arguments.sample, **options) if arguments.sample else None
-    plan = plan_of(arguments.vary, arguments.tie, sample, settings, arguments.critical)
-    plan = dataclasses.replace(plan, slip_limit=arguments.quake)
+    limits = None if arguments.quake is None else Limits.of(arguments.quake)
+    if not limits and (arguments.record or arguments.both_signs):
+        raise InputError("--record, --both-signs: need --quake")
     case = load_case(arguments, arguments.case)
+    motions: dict[str, list[Value]] = {}
+    if arguments.record:
+        motions[MOTION] = [str(file) for file in arguments.record]
+    if arguments.both_signs and not any(v.startswith("record_scale=") for v in arguments.vary):
+        motions["record_scale"] = [case["record_scale"]]
+    plan = plan_of(arguments.vary, arguments.tie, sample, settings, arguments.critical, motions)
+    if arguments.both_signs:
+        plan = in_both_signs(plan)
+    plan = dataclasses.replace(plan, quake=limits)
     if case.accuracy:
         case, estimate = meshed(case)
         say(f"mesh of all rows, refined for the unchanged case: {estimate}")
@@ -106,19 +138,29 @@ def call(arguments: argparse.Namespace) -> int:
     count, rows = sweep(planned, out, arguments.jobs, arguments.scheduler, on_note)
     say(f"{count} rows computed; {out}\n")
     say(f"{rows_table(plan, rows, table_width(arguments))}\n")
-    report_sweep(case, plan, rows, [] if plan.sampled else planned.cases, out)
+    report_sweep(case, plan, rows, [] if plan.sampled else planned.cases, out, arguments.intensity)
     return 0
 
 
-def report_sweep(case: Case, plan: Plan, rows: list[Row], cases: list[Case], out: Path) -> None:
-    """Print the statistics of a sweep and draw its chart beside its CSV file."""
+def report_sweep(
+    case: Case, plan: Plan, rows: list[Row], cases: list[Case], out: Path, intensity: str
+) -> None:
+    """Print the statistics of a sweep and draw its charts beside its CSV file."""
     from ..studies import chart
-    from ..studies.plan import CHART, beside
+    from ..studies.plan import CHART, FRAGILITY, beside
 
     if plan.sampled:
         from ..studies import outcome
 
         say(outcome.report(plan, rows, out))
+    if plan.quake:
+        from ..studies import fragility, fragility_picture
+
+        curves, drawn = fragility.fits(plan, rows, intensity), beside(out, FRAGILITY[1])
+        say(f"\n{fragility.report(curves, out, intensity)}")
+        if any(not curve.reason for curve in curves):
+            fragility_picture.draw(curves, case.title, intensity, drawn)
+            say(f"{drawn}\n")
     picture = beside(out, CHART)
     reason = chart.draw(plan, rows, cases, chart.heading(case, plan, len(rows)), picture)
     say(reason or str(picture))

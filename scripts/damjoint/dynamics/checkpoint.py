@@ -20,6 +20,7 @@ from ..arrays import Array
 from ..fem.cache import key_of, sources
 from ..input.case import Case
 from ..storage import read_entry, write_entry
+from . import record_files
 from .history import Peak, QuakeHistory
 from .scheme import Motion
 from .step import Moving
@@ -28,7 +29,7 @@ from .stepper import Earthquake
 
 def fingerprint(case: Case, span: tuple[float, float] | None) -> str:
     """Hash of all that an earthquake depends on; span: of its frames."""
-    record = case.record.read_bytes() if case.record else b""
+    record = record_files.content_of(case.record, case.record_vertical)
     values = [joint.values for joint in case.joints]
     loading = case.levels, case.tail_levels, case.times
     scene = json.dumps([__version__, sources(), key_of(case), values, loading, span], default=str)

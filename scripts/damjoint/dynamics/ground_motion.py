@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ..arrays import Array
-from .record import STANDARD_GRAVITY
+from .record_files import STANDARD_GRAVITY
 
 #: Damping ratio of the spectrum, and parts of the Arias intensity that bound the significant
 #: duration [Trifunac and Brady 1975].

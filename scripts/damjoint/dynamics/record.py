@@ -1,12 +1,9 @@
-"""Records of the ground's acceleration: CSV files with the columns time [s], horizontal and, if
-there is a third one, vertical acceleration.
-"""
+"""Records of the ground's acceleration: scaled, with their baseline corrected, and a rest."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
@@ -14,19 +11,11 @@ from .. import ROUND_OFF, InputError
 from ..arrays import Array, IntArray
 from ..input.case import Case
 from ..input.parameters import TINY
-from ..storage import text_of
+from .record_files import STANDARD_GRAVITY, read
 
-#: Standard gravity [m/s2], for records in g.
-STANDARD_GRAVITY = 9.80665
-
-#: Limits of a record, beyond which it is refused. Rows; strong motion has 1e3 to 1e5.
-MOST_ROWS = 1_000_000
-#: Bytes of its file.
-LONGEST = 200_000_000
-#: Acceleration over gravity; the strongest that were recorded reach 4.
+#: Limits of a record, beyond which it is refused. Acceleration over gravity; the strongest that
+#: were recorded reach 4.
 LARGEST = 1e3
-#: Time [s], with room for times since an epoch.
-LATEST = 1e10
 #: Interval [s]; usually 5e-3 to 2e-2.
 SHORTEST = 1e-9
 
@@ -63,13 +52,14 @@ class Record:
             raise InputError(
                 'record: must be set, record = "FILE.csv"; in the case, or --record FILE.csv'
             )
-        if case["record_unit"] == "unstated":
+        file = read(case.record, case.record_vertical)
+        if not file.in_si and case["record_unit"] == "unstated":
             raise InputError(
                 "record_unit = unstated: must be m/s2 or g, the unit of the accelerations in "
                 f"{case.record}"
             )
-        rows, lines = read(case.record)
-        unit = STANDARD_GRAVITY if case["record_unit"] == "g" else 1.0
+        rows, lines = file.rows, file.lines
+        unit = STANDARD_GRAVITY if case["record_unit"] == "g" and not file.in_si else 1.0
         parts = {"both": (1, 1), "horizontal": (1, 0), "vertical": (0, 1)}
         scale = unit * case["record_scale"] * np.array(parts[case["record_component"]])
         start, rest = case["record_start"], case["record_rest"]
@@ -217,50 +207,3 @@ def baseline(times: Array, acceleration: Array) -> Array:
 def at(times: Array, values: Array, time: float | Array) -> Array:
     """Values (n, 2) at times (n,), linear between them, at a time (2,) or at times (m, 2)."""
     return np.stack([np.interp(time, times, column) for column in values.T], axis=-1)
-
-
-def read(path: Path) -> tuple[Array, IntArray]:
-    """The rows of a record (n, 3): time, horizontal and vertical acceleration, 0 if it has none;
-    and their numbers (n,) among the lines of the file.
-
-    Lines that begin with # are comments; the first line may be a heading. Raises InputError.
-    """
-    name, meaning = f"record = {path}", "time [s], horizontal and, if any, vertical acceleration"
-    lines = text_of(path, name, LONGEST).splitlines()
-    rows, numbers = list[list[float]](), list[int]()
-    heading = True  # the first line that is none
-    for number, line in enumerate(lines, start=1):
-        if not line.strip() or line.startswith("#"):
-            continue
-        if len(rows) == MOST_ROWS:
-            raise InputError(f"{name}, row {number}: must have at most {MOST_ROWS} rows")
-        try:
-            row = [float(cell) for cell in line.split(",")]
-        except ValueError:
-            if not heading:
-                raise InputError(
-                    f"{name}, row {number}: {line.strip()[:60]}: must be numbers: {meaning}"
-                ) from None
-        else:
-            if len(row) not in (2, 3) or (rows and len(row) != len(rows[0])):
-                raise InputError(
-                    f"{name}, row {number}: {line.strip()[:60]}: must have 2 or 3 numbers, as many "
-                    f"as the others: {meaning}"
-                )
-            if not (np.isfinite(row).all() and abs(row[0]) <= LATEST):
-                raise InputError(
-                    f"{name}, row {number}: {line.strip()[:60]}: must be finite numbers, the time "
-                    f"within {LATEST:g} s"
-                )
-            if rows and not row[0] > rows[-1][0]:
-                raise InputError(
-                    f"{name}, row {number}: t = {row[0]:g} s: must be > {rows[-1][0]:g} s, the "
-                    "time before: times that increase"
-                )
-            rows.append(row)
-            numbers.append(number)
-        heading = False
-    if len(rows) < 2:
-        raise InputError(f"{name}: must have 2 to {MOST_ROWS} rows of {meaning}")
-    values = np.array(rows)
-    return np.pad(values, ((0, 0), (0, 3 - values.shape[1]))), np.array(numbers)

@@ -101,6 +101,8 @@ class Case(ParameterValues):
     geometry: Path | None = None
     #: file of the ground's acceleration, for `damjoint quake`
     record: Path | None = None
+    #: file of its vertical component, if that is another one
+    record_vertical: Path | None = None
     #: what it is made from; None for a case of stored results, which can not be varied
     source: Source | None = field(default=None, compare=False, repr=False)
     #: SHARED of pro/parameters.pro

@@ -195,7 +195,8 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
             raise InputError(f'{where}: must be {name} = "words"')
         words = tokens[2][1:-1]
         if name in ("geometry", "record", "hydrograph"):  # a path beside this file
-            words = str((path.parent / words).absolute())
+            files = record_files(words, path.parent) if name == "record" else (path.parent / words,)
+            words = "+".join(str(file.absolute()) for file in files)
         case.texts[name] = words
     elif name.startswith("default_") and tokens[1:2] == ("=",):
         name = name.removeprefix("default_")
@@ -218,6 +219,15 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
         note_owner(case, name, path)
     else:
         raise InputError(f"{where}: not a statement of a case; allowed: {allowed_like(tokens)}")
+
+
+def record_files(text: str, folder: Path = Path()) -> tuple[Path, ...]:
+    """The file of a record from a text, or two of its horizontal and vertical component, "H+V";
+    folder: of relative paths.
+    """
+    whole = folder / text
+    first, plus, second = text.partition("+")
+    return (folder / first, folder / second) if plus and not whole.exists() else (whole,)
 
 
 def allowed_like(tokens: tuple[str, ...]) -> str:

@@ -104,7 +104,6 @@ def resolve(source: Source) -> Case:
         hardening_requested=bool(variables["hardening_requested"][0]),
         accuracy=error,
         geometry=geometry,
-        record=Path(file.texts["record"]) if "record" in file.texts else None,
         source=source,
         shared={n: variables[n] for n in SHARED},
         section={n: variables[n] for n in SECTION},
@@ -112,6 +111,8 @@ def resolve(source: Source) -> Case:
         downstream_face=face,
         of_joints=stacked_joints(variables, of_joints),
     )
+    if "record" in file.texts:
+        result = with_record(result, file.texts["record"])
     for joint, parsed in zip(result.joints, of_joints or [variables], strict=True):
         check_softening(joint, bool(parsed["softening_twice"][0]))
     check_joints(result)
@@ -153,6 +154,12 @@ def check_geometry(geometry: Path, face: Sequence[float], accuracy: str | None) 
         )
 
 
+def with_record(case: Case, text: str | Path) -> Case:
+    """The case with a record: a path, or those of two components joined by +."""
+    files = casefile.record_files(str(text))
+    return replace(case, record=files[0], record_vertical=files[1] if len(files) > 1 else None)
+
+
 def varied(
     case: Case,
     overrides: Settings | None = None,
@@ -172,7 +179,8 @@ def varied(
     given = {"levels": levels, "tail_levels": tail_levels, "steps": steps, "accuracy": accuracy}
     changes: dict[str, Any] = {n: value for n, value in given.items() if value is not None}
     result = resolve(replace(case.source.with_overrides(overrides or {}), **changes))
-    return replace(result, name=case.name, record=case.record)
+    files = case.record, case.record_vertical
+    return replace(result, name=case.name, record=files[0], record_vertical=files[1])
 
 
 def check_loading(case: Case, tails: Sequence[float], of_case: bool) -> None:

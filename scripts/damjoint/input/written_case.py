@@ -43,7 +43,8 @@ def text_with_loading(file: CaseText, case: Case, names: Sequence[str]) -> str:
     """
     file.texts = {"title": case.title}
     if case.record:
-        file.texts["record"] = str(case.record.resolve())
+        files = filter(None, (case.record, case.record_vertical))
+        file.texts["record"] = "+".join(str(path.resolve()) for path in files)
     if case.geometry:
         file.texts["geometry"] = str(case.geometry.resolve())
     if case.also_uplift:

@@ -83,11 +83,15 @@ class DenseSystem:
         self, tangent: Tangent, right: Array, border: Border | None = None
     ) -> tuple[Array, float]:
         """See `LinearSystem`."""
+        return lu_solve(self.matrix(tangent), right), 0.0
+
+    def matrix(self, tangent: Tangent) -> Array:
+        """S + K (j, j)."""
         matrix = self.stiffness + self.assembly.dense(tangent.law)
         if flow := tangent.flow:
             lift = stacked([part.lift.T for part in tangent.flowing]).T
             matrix[:, flow.columns] -= lift @ flow.pressure
-        return lu_solve(matrix, right), 0.0
+        return matrix
 
 
 class WoodburySystem:

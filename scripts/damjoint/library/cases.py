@@ -13,7 +13,7 @@ from .. import InputError
 from ..arrays import Value
 from ..input.case import Case
 from ..input.case_names import is_name
-from ..input.resolve import load, varied
+from ..input.resolve import load, varied, with_record
 from ..python_words import in_python, speaks_python
 from ..statics.notes import notes
 
@@ -42,7 +42,8 @@ def case(
         tail_levels: of the tailwater [m] at t = 1, 2, ..., or the same at all times.
         steps: equal load steps between two levels.
         accuracy: coarse, standard, fine or a percentage; mesh and steps are refined for it.
-        record: CSV of the ground's acceleration, for `quake`.
+        record: file of the ground's acceleration, for `quake`: CSV, .AT2 of PEER or COSMOS; of two
+            such files with the horizontal and the vertical component "H.AT2+V.AT2".
         name: of the case in tables and of its files, by default that of the source.
         parameters: by name, in SI units, as in reference/parameters.md, or as a text with a unit,
             "20*GPa".
@@ -64,8 +65,9 @@ def case(
         result = load(str(source), parameters, *loading)
     if name is not None and not is_name(name):
         raise InputError(f"name = {name!r}: must be a text that can be the name of a file")
-    path = result.record if record is None else Path(record)
-    return replace(result, name=result.name if name is None else name, record=path)
+    if record is not None:
+        result = with_record(result, record)
+    return result if name is None else replace(result, name=name)
 
 
 def as_case(source: Case | str | Path) -> Case:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from .. import InputError
 from ..arrays import Array, Table
 from ..input.case import Case
+from ..input.resolve import with_record
 from ..model.results import MODES, history_columns, joint_columns, quake_columns
 from ..python_words import speaks_python
 from .cases import as_case, noted
@@ -130,7 +131,7 @@ def quake(
 
     Args:
         source: a case, or its name or path, see `case`.
-        record: CSV of the ground's acceleration (default: that of the case).
+        record: file of the ground's acceleration, see `case` (default: that of the case).
         engine: condensed (auto), or getdp, the reference model.
         progress: show a bar, or where there is no terminal a line every ten seconds.
 
@@ -148,7 +149,7 @@ def quake(
     from ..studies import quake_study
 
     chosen = as_case(source)
-    chosen = noted(chosen if record is None else replace(chosen, record=Path(record)))
+    chosen = noted(chosen if record is None else with_record(chosen, record))
     options = quake_study.Options(engine, progress=progress)
     quake_study.check(chosen, options)
     tables = quake_study.compute(chosen, options)

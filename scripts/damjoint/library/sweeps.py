@@ -15,7 +15,7 @@ from ..input.case import Case
 from ..model.results import HISTORY, IN_TIME, LATERAL, history_columns
 from ..progress import track
 from ..python_words import speaks_python
-from ..studies.plan import Plan, Sample, cases_of, column_of, in_file, listed, plan_with
+from ..studies.plan import Limits, Plan, Sample, cases_of, column_of, in_file, listed, plan_with
 from .cases import as_case, noted, on_fixed_mesh, warn
 from .tables import Tables, WithTables, by_column, displayed, records
 
@@ -55,6 +55,26 @@ class Sweep(WithTables):
         from ..studies.outcome import sensitivities
 
         return self.statistics(sensitivities(self.plan, self.texts))
+
+    def fragility(self, intensity: str = "peak_ground_ax") -> np.recarray:
+        """Of earthquakes: the lognormal fragility of each limit, by maximum likelihood: median with
+        its 95 % interval, dispersion, numbers of rows; nan and the reason where there is none.
+
+        Args:
+            intensity: peak_ground_ax, peak_ground_vx, arias_x or spectral_ax.
+
+        Raises:
+            InputError: another intensity, or no earthquakes.
+        """
+        from ..studies.fragility import fits
+
+        if not self.plan.quake:
+            raise InputError("fragility: needs a sweep with quake = a limit")
+        rows = [curve.row() for curve in fits(self.plan, self.texts, intensity)]
+        numbers = ("median", "median_low", "median_high", "dispersion")
+        return records(
+            by_column([r | {n: np.nan if r[n] == "" else r[n] for n in numbers} for r in rows])
+        )
 
     def statistics(self, rows: Sequence[Mapping[str, Value]]) -> np.recarray:
         """Rows of statistics, with the varied values as they were before they became texts."""
@@ -102,6 +122,17 @@ class Sweep(WithTables):
         return f"sweep of {', '.join(self.plan.names)}: {len(self.rows)} rows, {fails} fail"
 
 
+def limits_of(quake: float | Mapping[str, float | Sequence[float]] | None) -> Limits | None:
+    """The limits of a sweep of earthquakes. Raises InputError."""
+    if quake is None:
+        return None
+    given = quake if isinstance(quake, Mapping) else {"slip": quake}
+    for name in given:
+        if name not in ("slip", "opening"):
+            raise InputError(f"quake: {name}: must be slip or opening")
+    return Limits(**{n: tuple(np.atleast_1d(v).astype(float).tolist()) for n, v in given.items()})
+
+
 def column_array(name: str, values: list[Value]) -> np.ndarray:
     """A column of a sweep; an empty cell of a result that is a number becomes nan."""
     from ..studies.quake_summary import QUAKE_UNITS
@@ -117,7 +148,7 @@ def sweep(
     sample: Sample | None = None,
     tie: Mapping[str, str] | None = None,
     critical: str = "",
-    quake: float | None = None,
+    quake: float | Mapping[str, float | Sequence[float]] | None = None,
     jobs: int | None = None,
     progress: bool = False,
     **values: Sequence[Value] | Value,
@@ -132,8 +163,9 @@ def sweep(
         sample: random values, such as `Sample(100, {"mu": "normal(0.8,0.1)"})`.
         tie: parameters computed from the others, such as `{"adhesion": "2e5*mu"}`.
         critical: also find the critical level, strength, ... of each row, see `critical`.
-        quake: each row is the earthquake of the case's record; it fails if the residual slip
-            exceeds this limit [m].
+        quake: each row is an earthquake; it fails if the residual slip exceeds this limit [m], or
+            one of several, {"slip": [0.05, 0.2], "opening": 0.01}, or if the dam does not stand.
+            The values `record` are the records, by default that of the case.
         jobs: number of processes (default: one per core).
         progress: show a bar, or where there is no terminal a line every ten seconds.
         values: lists of values of parameters, by name; `level` [m] is the last level.
@@ -152,11 +184,9 @@ def sweep(
     check_jobs(jobs)
     if not values and not sample:
         raise InputError("sweep: must have values or a sample, such as mu=[0.8, 1.0]")
-    if quake is not None and not quake > 0:
-        raise InputError(f"quake = {quake}: must be a slip > 0 m")
     axes = [(name, listed(name, np.atleast_1d(v).tolist())) for name, v in values.items()]
     plan = plan_with(axes, list((tie or {}).items()), sample, {}, critical)
-    plan = replace(plan, slip_limit=quake)
+    plan = replace(plan, quake=limits_of(quake))
     case = on_fixed_mesh(noted(as_case(source)))
     rows = PlannedRows(case, plan)
     computed = rows.compute(jobs)

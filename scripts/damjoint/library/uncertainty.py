@@ -190,7 +190,8 @@ def sensitivity(source: Case | str | Path, *names: str, critical: bool = False) 
 
     Args:
         source: a case, or its name or path, see `case`.
-        names: parameters, or one of a joint, "lift 25 m.mu"; none: all that have an effect.
+        names: parameters, or one of a joint, "lift 25 m.mu"; none: all that have an effect, but
+            those of the geometry, whose derivatives are differences of two runs (of_runs: 1).
         critical: of the critical level instead of the results of a run.
 
     Raises:
@@ -207,7 +208,7 @@ def sensitivity(source: Case | str | Path, *names: str, critical: bool = False) 
     from ..studies.sensitivity import ALL, names_of, of_point, of_run, table
 
     chosen = on_fixed_mesh(noted(as_case(source)))
-    listed_names = names_of(chosen, ",".join(names) or ALL)
+    listed_names = names_of(chosen, ",".join(names) or ALL, geometry=not critical)
     if not critical:
         return records(table(of_run(chosen, listed_names)))
     answer = Search(replace(chosen, all_steps=True), "level").find()

@@ -14,19 +14,26 @@ as at open points, a second correction follows; its size shows a kink.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from .. import InputError, RunError
 from ..arrays import Array
+from ..csr import CsrMatrix
+from ..fem.cache import key_of
 from ..input.case import Case
-from ..input.parameters import parameter
+from ..input.parameters import independent, parameter
 from ..input.resolve import varied
-from ..joint.linear_system import Border
-from ..model.loads import LEVEL, Loading
-from ..model.results import history_table
+from ..joint.equilibrium import Equilibrium
+from ..joint.linear_system import Border, DenseSystem, Tangent
+from ..joint.problem import JointProblem
+from ..model.loads import LEVEL, Loading, Unknown
+from ..model.results import column_of, history_table
+from ..statics.gravity import factors_of_state
 from .controls import DisplacementControl, Prescribed
 from .history import History
 from .model import Begun, Model, StepResult
@@ -34,12 +41,17 @@ from .state import State, Trace
 
 #: Half of the difference of a parameter, over its value [-]; of one that is zero in its unit, and
 #: in these units.
-DIFFERENCE = 1e-5
+DIFFERENCE = 3e-6
 ZERO = {"Pa": 1.0, "Pa per m": 1e5, "N per m": 1e-1, "kg per m3": 1e-2}
 
 #: Corrections of a derivative, and the last one over the derivative beyond which a point of the
 #: joint is at a kink: about to open, to slip or to break [-].
 CORRECTIONS, KINK = 3, 1e-5
+#: Correction over the derivative up to which there is no further one [-].
+EXACT = 1e-9
+
+#: Safety factors whose derivatives are given, of a joint whose law limits its shear.
+FACTORS = "SSF", "OSF"
 
 #: Groups of parameters on which the mesh or the way to the solution depends.
 NOT_CONTINUOUS = "Mesh", "Solver", "Geometry"
@@ -80,12 +92,43 @@ class Derivative:
 
 
 def history_row(side: Side) -> dict[str, float]:
-    """The row of history.csv of a state."""
-    history = History(side.model.equilibrium, at_rest=side.at_rest)
+    """The row of history.csv of a state, and of each joint the FACTORS and the end of its crack."""
+    equilibrium = side.model.equilibrium
+    history = History(equilibrium, at_rest=side.at_rest)
     history.add(StepResult(side.state, 0, 0.0), 0)
     rows = {name: np.array(values, float) for name, values in history.rows.items()}
-    table = history_table(side.model.case, rows)
-    return {name: float(column[-1]) for name, column in table.items()}
+    case = side.model.case
+    row = {name: float(c[-1]) for name, c in history_table(case, rows).items()}
+    for k, joint in enumerate(case.joints):
+        of_joint = {n: row[column_of(n, k)] for n in ("N", "T", "M", "bonded_length")}
+        state = of_joint | {n: row[n] for n in ("time", "level")}
+        factors = factors_of_state(joint, state) if joint.law.limits_shear else {}
+        row |= {column_of(name, k): factors.get(name, math.nan) for name in FACTORS}
+        row[column_of("crack_end", k)] = crack_end(equilibrium, side.state, k)
+    return row
+
+
+def crack_end(equilibrium: Equilibrium, state: State, number: int) -> float:
+    """Where the crack from the heel of a joint, by its number, ends [m]: there the opening, linear
+    between the Gauss points, is that from which on the law counts a point as crack; 0 without one.
+    It follows the state continuously, the length of crack in history.csv counts points.
+    """
+    joint, law = equilibrium.interface.joints[number], equilibrium.laws.laws[number]
+    if joint.dim == 3:
+        return math.nan
+    along = joint.chord.along[:2]
+    heel = (joint.space.locations[:, :2] @ along).min()
+    variables = state.variables.joints[number]
+    jump = joint.jumps(joint.at_points, state.jump)
+    place = joint.points.positions[:, :2] @ along - heel
+    order = np.argsort(place)
+    beyond = (jump[:, 0] - law.opening_of_crack(variables, len(jump)))[order]
+    closed = np.flatnonzero(beyond <= 0)
+    if not len(closed) or closed[0] == 0:
+        return joint.length if not len(closed) else 0.0
+    k = closed[0]
+    part = beyond[k - 1] / (beyond[k - 1] - beyond[k])
+    return float(place[order][k - 1] + part * (place[order][k] - place[order][k - 1]))
 
 
 def half_difference(case: Case, name: str) -> tuple[float, float, float]:
@@ -120,96 +163,179 @@ def half_difference(case: Case, name: str) -> tuple[float, float, float]:
     return value, low, high
 
 
+@dataclass(frozen=True)
+class Linearised:
+    """The linear system of a step at its end, for all parameters at once."""
+
+    problem: JointProblem
+    tangent: Tangent
+    #: with a prescribed displacement; its gap is that of each right side
+    border: Border | None
+
+    @cached_property
+    def matrix(self) -> Array:
+        """The dense matrix with its border."""
+        assert not isinstance(self.problem.stiffness, CsrMatrix)
+        system = DenseSystem(self.problem.interface.assembly, self.problem.stiffness)
+        matrix = system.matrix(self.tangent)
+        if border := self.border:
+            corner = np.array([[border.rate]])
+            matrix = np.block([[matrix, border.slope[:, None]], [border.row[None], corner]])
+        return matrix
+
+    def solve(self, rights: Array, gaps: Array) -> tuple[Array, Array]:
+        """The solutions (j, k) for right sides (j, k), and the rates (k,) of the level for gaps
+        (k,), zero without border.
+
+        Raises LinAlgError if the system is singular.
+        """
+        if isinstance(self.problem.stiffness, CsrMatrix):
+            borders = [self.border and replace(self.border, gap=float(gap)) for gap in gaps]
+            system, pairs = self.problem.system, zip(rights.T, borders, strict=True)
+            columns = [system.solve(self.tangent, right, border) for right, border in pairs]
+            return np.array([x for x, _ in columns]).T, np.array([s for _, s in columns])
+        whole = np.vstack([rights, gaps]) if self.border else rights
+        solution = np.asarray(np.linalg.solve(self.matrix, whole), float)
+        return (solution[:-1], solution[-1]) if self.border else (solution, np.zeros(len(gaps)))
+
+
+@dataclass
+class Parameter:
+    """A parameter with the models on both sides of its value, and their states along a path."""
+
+    distance: float
+    models: tuple[Model, Model]
+    sides: tuple[Side, Side]
+    kink: bool = False
+    #: of the step under way: its beginnings on both sides, their problems, rates of jump and level
+    begun: Sequence[Begun] = ()
+    problems: Sequence[JointProblem] = ()
+    rate: Array = field(default_factory=lambda: np.zeros(0))
+    level_rate: float = 0.0
+    #: of its loads what the level rate is of
+    unknown: Unknown = LEVEL
+
+    def begin(self, time: float, size: int, unknown: Unknown) -> None:
+        """Begin a step to a time; size: of the jumps; unknown: beside them."""
+        self.unknown = unknown
+        self.begun = [side.model.begin(side.state, time) for side in self.sides]
+        self.problems = [step.problem for step in self.begun]
+        self.rate, self.level_rate = np.zeros(size), 0.0
+
+    def ends(self, end: State) -> list[tuple[Begun, JointProblem, Array, Loading]]:
+        """On each side beginning, problem, jump and loading at the end of the step, to first order;
+        end: of the step between them.
+        """
+        result = []
+        for sign, step, problem in zip((-1, 1), self.begun, self.problems, strict=True):
+            half = sign * self.distance / 2
+            loading = step.model.loading(end.time, end.loading.level)
+            value = self.unknown.of(end.loading) + half * self.level_rate
+            loading = self.unknown.at(loading, value)
+            result.append((step, problem, end.jump + half * self.rate, loading))
+        return result
+
+    def right(self, end: State) -> Array:
+        """The right side (j,) that remains."""
+        low, high = (p.residual(jump, loading).value for _, p, jump, loading in self.ends(end))
+        return (low - high) / self.distance
+
+    def gap(self, end: State, control: DisplacementControl | None) -> float:
+        """That of the prescribed displacement; 0 without."""
+        if control is None:
+            return 0.0
+        low, high = (
+            control.measure(step.model.equilibrium, jump, loading)
+            for step, _, jump, loading in self.ends(end)
+        )
+        return (low - high) / self.distance
+
+    def add(self, change: Array, level_change: float, correction: bool) -> bool:
+        """Add to the rates; whether they need a further correction. correction: whether these are
+        changes of a derivative, which are large at a kink.
+        """
+        self.rate, self.level_rate = self.rate + change, self.level_rate + level_change
+        error, size = float(np.linalg.norm(change)), float(np.linalg.norm(self.rate))
+        self.kink |= correction and error > KINK * size > 0
+        return not correction or error > EXACT * size
+
+    def end(self, end: State, at_rest: bool) -> Derivative:
+        """The derivative at the end of the step, where the next one begins; at_rest: whether
+        displacements count from there.
+        """
+        low, high = (
+            replace(side, state=step.end(jump, loading).after(side.state))
+            for side, (step, _, jump, loading) in zip(self.sides, self.ends(end), strict=True)
+        )
+        if at_rest:
+            low, high = (replace(side, at_rest=side.state) for side in (low, high))
+        self.sides = low, high
+        return Derivative(low, high, self.distance, self.kink)
+
+
 class Differentiation:
     """The derivatives of the states of a case along the updates that have led to one of them."""
 
-    def __init__(self, model: Model, name: str) -> None:
-        """name: of a parameter, or of one of a joint, "lift 25 m.mu". Raises InputError."""
-        _, low, high = half_difference(model.case, name)
-        self.model, self.distance = model, high - low
-        self.models = [self.model_with(name, value) for value in (low, high)]
-        self.kink = False
+    def __init__(self, model: Model, names: Sequence[str]) -> None:
+        """names: of parameters, or of one of a joint, "lift 25 m.mu". Raises InputError."""
+        self.model = model
+        self.parameters = dict[str, Parameter]()
+        self.key = key_of(model.case)
+        for name in names:
+            _, low, high = half_difference(model.case, name)
+            models = self.model_with(name, low), self.model_with(name, high)
+            sides = Side(models[0], models[0].start()), Side(models[1], models[1].start())
+            self.parameters[name] = Parameter(high - low, models, sides)
 
     def model_with(self, name: str, value: float) -> Model:
-        """The model with a value."""
-        case = varied(self.model.case, {name: value})
-        case = replace(case, levels=self.model.case.levels, tail_levels=self.model.case.tail_levels)
-        return Model(replace(case, times=self.model.case.times))
+        """The model with a value: on the same bodies, unless they depend on the parameter."""
+        case = self.model.case
+        if name in independent():
+            other = case.changed({name: value})
+        else:
+            other = varied(case, {name: value})
+            other = replace(other, levels=case.levels, tail_levels=case.tail_levels)
+            other = replace(other, times=case.times)
+        same = key_of(other) == self.key
+        return Model(other, self.model.equilibrium.interface if same else None)
 
-    def along(self, updates: Sequence[Trace]) -> list[Derivative]:
-        """The derivative of each state of a path.
+    def along(self, updates: Sequence[Trace]) -> list[dict[str, Derivative]]:
+        """The derivatives of each state of a path, by parameter.
 
         Raises RunError if one of them was reached by relaxation with frozen damage.
         """
-        state, results = self.model.start(), list[Derivative]()
-        low, high = (Side(model, model.start()) for model in self.models)
+        state, results = self.model.start(), list[dict[str, Derivative]]()
         for update in updates:
             if update.frozen:
                 raise RunError(
                     f"sensitivity: the crack has grown unstably at level "
                     f"{update.state.loading.level:.6g} m; the state after it has no derivative"
                 )
-            low, high = self.step(state, update, low, high)
+            self.step(state, update)
             state = update.state
-            if state.time == 0 and self.model.case["weight_first"]:
-                low, high = (replace(side, at_rest=side.state) for side in (low, high))
-            results.append(Derivative(low, high, self.distance, self.kink))
+            at_rest = state.time == 0 and bool(self.model.case["weight_first"])
+            results.append({n: p.end(state, at_rest) for n, p in self.parameters.items()})
         return results
 
-    def step(self, state: State, update: Trace, low: Side, high: Side) -> tuple[Side, Side]:
-        """The states on both sides at the end of a step."""
-        end, sides = update.state, (low, high)
-        time, jump = end.time, end.jump
-        begun = [side.model.begin(side.state, time) for side in sides]
-        problems = [step.problem for step in begun]
+    def step(self, state: State, update: Trace) -> None:
+        """Solve for the rates of all parameters at the end of a step from a state."""
+        end = update.state
         control = update.control if isinstance(update.control, DisplacementControl) else None
+        problem, border = self.model.begin(state, end.time).problem, None
+        here = problem.residual(end.jump, end.loading)
         unknown = control.unknown if control else LEVEL
-        level, value = end.loading.level, unknown.of(end.loading)
-        problem = self.model.begin(state, time).problem
-        here = problem.residual(jump, end.loading)
-        tangent, slope = here.by_jump(False), here.by_unknown(unknown) if control else None
-        rate, level_rate = np.zeros(len(jump)), 0.0
-        half = self.distance / 2
-        for number in range(CORRECTIONS):
-            jumps = [jump - half * rate, jump + half * rate]
-            loadings = [
-                unknown.at(step.model.loading(time, level), value + sign * half * level_rate)
-                for step, sign in zip(begun, (-1, 1), strict=True)
-            ]
-            ends = zip(problems, jumps, loadings, strict=True)
-            low_value, high_value = (p.residual(d, h).value for p, d, h in ends)
-            right, border = -(high_value - low_value) / self.distance, None
-            if control:
-                assert slope is not None
-                prescribed = Prescribed(control, self.model.equilibrium)
-                measured = [
-                    control.measure(step.model.equilibrium, d, h)
-                    for step, d, h in zip(begun, jumps, loadings, strict=True)
-                ]
-                gap = -(measured[1] - measured[0]) / self.distance
-                border = Border(slope, prescribed.row, prescribed.rate(end.loading), gap)
-            change, level_change = problem.system.solve(tangent, right, border)
-            rate, level_rate = rate + change, level_rate + level_change
-            size = float(np.linalg.norm(rate))
-            if number and np.linalg.norm(change) > KINK * size > 0:
-                self.kink = True
-        jumps = [jump - half * rate, jump + half * rate]
-        loadings = [
-            unknown.at(step.model.loading(time, level), value + sign * half * level_rate)
-            for step, sign in zip(begun, (-1, 1), strict=True)
-        ]
-        return self.ends(begun, sides, jumps, loadings)
-
-    @staticmethod
-    def ends(
-        begun: Sequence[Begun],
-        sides: Sequence[Side],
-        jumps: Sequence[Array],
-        loadings: Sequence[Loading],
-    ) -> tuple[Side, Side]:
-        """Both sides at the end of a step."""
-        low, high = (
-            replace(side, state=step.end(jump, loading).after(side.state))
-            for side, step, jump, loading in zip(sides, begun, jumps, loadings, strict=True)
-        )
-        return low, high
+        if control:
+            given = Prescribed(control, self.model.equilibrium)
+            border = Border(here.by_unknown(unknown), given.row, given.rate(end.loading), 0.0)
+        linear, under_way = Linearised(problem, here.by_jump(False), border), [*self.parameters]
+        for part in self.parameters.values():
+            part.begin(end.time, len(end.jump), unknown)
+        for number in range(CORRECTIONS if under_way else 0):
+            parts = [self.parameters[name] for name in under_way]
+            rights = np.array([part.right(end) for part in parts]).T
+            gaps = np.array([part.gap(end, control) for part in parts])
+            changes, level_changes = linear.solve(rights, gaps)
+            pairs = zip(under_way, parts, changes.T, level_changes.tolist(), strict=True)
+            under_way = [n for n, p, x, s in pairs if p.add(x, s, number > 0)]
+            if not under_way:
+                break

@@ -2,12 +2,14 @@
 
 Weighted least squares [scipy.optimize.least_squares, trust region reflective] over the logarithm of
 parameters that are positive, and over others as they are. Measured values have independent normal
-errors of given standard deviations, priors are further terms. Intervals are those of the problem
-linearised at the estimate [Seber and Wild, Nonlinear Regression, 1989].
+errors of given standard deviations, priors are further terms. Intervals are those of the profile
+likelihood [Venzon and Moolgavkar 1988] with residuals of second order around the estimate; where
+this has none, as beside a limit, those of the problem linearised there [Seber and Wild 1989].
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -23,6 +25,7 @@ from ..input.arithmetic import explained, quantity
 from ..input.case import Case
 from ..input.resolve import varied
 from ..processes import as_finished, number_of
+from ..solver.load_stepper import LoadStepper
 from ..threads import limited_threads
 from . import sampling
 from .measurements import Measurements, Series
@@ -52,6 +55,8 @@ NO_EFFECT = 1e-10
 SIGNIFICANCE = 0.01
 #: Fewest values of a series whose residuals are tested for trends.
 FEWEST = 8
+#: Farthest end of an interval of the profile likelihood, in standard deviations [-].
+FARTHEST = 6.0
 #: Weighted residual of a reading that a trial of the search does not reach.
 UNREACHED = 1e3
 
@@ -180,15 +185,21 @@ class Calibration:
     #: number of runs, and whether the search came to its end
     runs: int = 0
     converged: bool = True
+    #: ends of the intervals of the scaled parameters (parameters, 2), nan: by their deviations
+    ends: Array | None = None
+    #: the run of the case with the estimates
+    stepper: LoadStepper | None = None
     #: interval of each parameter, low and high (parameters, 2)
     intervals: Array = field(init=False)
 
     def __post_init__(self) -> None:
         width = stats.norm.ppf((1 + CONFIDENCE) / 2) * self.deviations
+        linear = np.column_stack([self.x - width, self.x + width])
+        ends = linear if self.ends is None else np.where(np.isnan(self.ends), linear, self.ends)
         limits = []
-        for one, x, w in zip(self.free, self.x, width, strict=True):
+        for one, pair in zip(self.free, ends, strict=True):
             low, high = one.scaled(one.low), one.scaled(one.high)
-            limits.append([one.value(float(np.clip(v, low, high))) for v in (x - w, x + w)])
+            limits.append([one.value(float(v)) for v in np.clip(pair, low, high)])
         self.intervals = np.array(limits)
 
     @property
@@ -329,8 +340,9 @@ class Fit:
         self.measured = np.array([one.measured for one in measurements.series])
         self.deviation = np.array([one.deviation for one in measurements.series])
         self.read = np.isfinite(self.measured)
-        #: last scaled parameters and what they compute
+        #: last scaled parameters and what they compute, and the run of the last that has all
         self.last: tuple[Array, Computed] = np.array([]), None
+        self.stepper: LoadStepper | None = None
 
     def at(self, x: Array) -> Case:
         """The case with scaled parameters."""
@@ -339,7 +351,11 @@ class Fit:
     def computed(self, x: Array) -> Computed:
         """What the case computes with scaled parameters."""
         if not np.array_equal(self.last[0], x):
-            self.last = x.copy(), trial(self.measurements, self.at(x))
+            found: Computed = None
+            with limited_threads(1), contextlib.suppress(RunError):
+                self.stepper = self.measurements.run_of(self.at(x))
+                found = self.measurements.of_run(self.stepper)
+            self.last = x.copy(), found
             self.runs += 1
         return self.last[1]
 
@@ -373,11 +389,7 @@ class Fit:
                     x[k] + factor * step, one.scaled(one.low), one.scaled(one.high)
                 )
                 steps.append((k, shifted))
-        work = partial(trial, self.measurements)
-        cases = [self.at(shifted) for _, shifted in steps]
-        jobs = number_of(self.jobs, len(cases))
-        found = dict(as_finished(work, cases, jobs) if jobs > 1 else enumerate(map(work, cases)))
-        self.runs += len(cases)
+        found = self.computed_at([shifted for _, shifted in steps])
         start = self.weighted(x, self.computed(x))
         slopes = np.zeros((len(start), len(self.free)))
         ends: dict[int, list[tuple[float, Array]]] = {k: [] for k in range(len(self.free))}
@@ -393,13 +405,50 @@ class Fit:
             slopes[:, k] = (r1 - r0) / (x1 - x0)
         return slopes
 
+    def computed_at(self, points: Sequence[Array]) -> list[Computed]:
+        """What the case computes at several scaled parameters, in parallel."""
+        work, cases = partial(trial, self.measurements), [self.at(point) for point in points]
+        jobs = number_of(self.jobs, len(cases))
+        found = dict(as_finished(work, cases, jobs) if jobs > 1 else enumerate(map(work, cases)))
+        self.runs += len(cases)
+        return [found[number] for number in range(len(cases))]
+
+    def profile(self, x: Array, covariance: Array) -> Array | None:
+        """The ends (parameters, 2) of the intervals of the profile likelihood around an estimate,
+        nan where there is none; None if a parameter is not determined, or if the dam has no
+        equilibrium within a standard deviation.
+        """
+        deviations = np.sqrt(np.diag(covariance))
+        limits = np.array([[one.scaled(v) for v in (one.low, one.high)] for one in self.free])
+        inside = np.minimum(x - limits[:, 0], limits[:, 1] - x) > deviations
+        if not (deviations <= DETERMINED).all() or not inside.all():
+            return None
+        number, units = len(x), np.diag(deviations)
+        pairs = [(i, j) for i in range(number) for j in range(i)]
+        points = [*(x + units), *(x - units), *(x + units[i] + units[j] for i, j in pairs)]
+        found = self.computed_at([np.clip(point, *limits.T) for point in points])
+        if any(computed is None for computed in found):
+            return None
+        parts = [self.weighted(p, c) for p, c in zip(points, found, strict=True)]
+        values, start = np.array(parts), self.weighted(x, self.computed(x))
+        above, below, mixed = np.split(values, [number, 2 * number])
+        bends = np.zeros((number, number, len(start)))
+        bends[np.diag_indices(number)] = above + below - 2 * start
+        for (i, j), value in zip(pairs, mixed, strict=True):
+            bends[i, j] = bends[j, i] = (
+                value - start - (above - below)[[i, j]].sum(axis=0) / 2
+            ) - (bends[i, i] + bends[j, j]) / 2
+        ends = Quadratic(start, (above - below) / 2, bends).profile_ends()
+        return x[:, None] + deviations[:, None] * ends
+
     def run(self) -> Calibration:
         """Find the estimates.
 
         Raises RunError if the dam has no equilibrium with the start values.
         """
         start = np.zeros(len(self.free))
-        self.last = start.copy(), self.measurements.computed(self.case)  # its error is the user's
+        self.stepper = self.measurements.run_of(self.case)
+        self.last = start.copy(), self.measurements.of_run(self.stepper)  # its error is the user's
         self.runs = 1
         low = np.array([one.scaled(one.low) for one in self.free])
         high = np.array([one.scaled(one.high) for one in self.free])
@@ -417,10 +466,86 @@ class Fit:
         if computed is None:
             raise RunError("the search ended where the dam has no equilibrium at a reading")
         covariance = inverse(self.derivatives(found.x, central=True))
-        case, converged = self.at(found.x), found.status > 0
+        ends = self.profile(found.x, covariance)
         return Calibration(
-            case, self.free, self.measurements, found.x, covariance, computed, self.runs, converged
+            case=self.at(found.x),
+            free=self.free,
+            measurements=self.measurements,
+            x=found.x,
+            covariance=covariance,
+            computed=computed,
+            runs=self.runs,
+            converged=found.status > 0,
+            ends=ends,
+            stepper=self.stepper,
         )
+
+
+@dataclass(frozen=True)
+class Quadratic:
+    """Weighted residuals of second order in p parameters z, in standard deviations."""
+
+    #: (n,) at the estimate, z = 0; first (p, n) and second (p, p, n) derivatives
+    start: Array
+    slopes: Array
+    bends: Array
+
+    def residuals(self, z: Array) -> Array:
+        """The residuals (n,)."""
+        return np.asarray(self.start + z @ self.slopes + z @ np.tensordot(z, self.bends, 1) / 2)
+
+    def jacobian(self, z: Array) -> Array:
+        """Their derivatives (n, p)."""
+        return np.asarray((self.slopes + np.tensordot(z, self.bends, 1)).T)
+
+    def least(self, fixed: int | None, value: float, first: Array) -> tuple[float, Array]:
+        """The least sum of squares, one parameter fixed at a value or none, and where it is; first:
+        where the search begins.
+        """
+        free = [k for k in range(len(self.slopes)) if k != fixed]
+
+        def whole(part: Array) -> Array:
+            z = np.zeros(len(self.slopes))
+            z[free] = part
+            if fixed is not None:
+                z[fixed] = value
+            return z
+
+        if not free:
+            z = whole(np.zeros(0))
+            return float(np.sum(self.residuals(z) ** 2)), z
+
+        def residuals(part: Array) -> Array:
+            return self.residuals(whole(part))
+
+        def jacobian(part: Array) -> Array:
+            return self.jacobian(whole(part))[:, free]
+
+        found = optimize.least_squares(
+            residuals,
+            first[free],
+            jacobian,
+            method="lm" if len(self.start) >= len(free) else "trf",
+        )
+        return float(2 * found.cost), whole(found.x)
+
+    def profile_ends(self) -> Array:
+        """The values (p, 2) of each parameter at which the least sum of squares with the others is
+        larger by the quantile of chi2; nan beyond FARTHEST.
+        """
+        number, most = len(self.slopes), float(stats.chi2.ppf(CONFIDENCE, 1))
+        least, middle = self.least(None, 0.0, np.zeros(number))
+        ends = np.full((number, 2), np.nan)
+        for k in range(number):
+            for side, sign in enumerate((-1, 1)):
+
+                def excess(size: float, k: int = k, sign: int = sign) -> float:
+                    value = middle[k] + sign * size
+                    return self.least(k, value, middle)[0] - least - most
+
+                if excess(FARTHEST) > 0:
+                    ends[k, side] = middle[k] + sign * optimize.brentq(excess, 0.0, FARTHEST)
+        return ends
 
 
 def inverse(slopes: Array) -> Array:

@@ -12,11 +12,9 @@ from ..engines.condensed.solve import about
 from ..input import parameters
 from ..input.case import Case
 from ..input.written_case import case_text
-from ..joint.interface import interface_of
 from ..post.summary import aligned
 from ..post.tables import Column, write_csv
 from ..session import Session, preparation, session
-from ..solver.load_stepper import LoadStepper
 from ..storage import atomic_write
 from ..units import with_slash
 from .calibrate import CONFIDENCE, Calibration, Fit, Free
@@ -67,8 +65,8 @@ def compute(
 def save(study: Session, answer: Calibration, picture: bool) -> None:
     """Write the files of a calibration."""
     name = study.case.name
-    stepper = LoadStepper(answer.case, interface_of(answer.case))
-    stepper.run()
+    stepper = answer.stepper
+    assert stepper
     result = stepper.results()
     entries = {"calibration": as_json(answer), "wall_seconds": {"search": study.seconds}}
     result.info |= about(stepper.model.equilibrium.bulk) | entries

@@ -135,6 +135,7 @@ def is_number(value: float | str) -> bool:
 #: Names and units of what is varied besides parameters.
 QUANTITIES = {
     "level": ("water level", "m"),
+    "record": ("record", ""),
     "strength": ("strength reduction", "-"),
     "uplift": ("drain_effectiveness", "-"),
 }
@@ -182,7 +183,7 @@ def is_marked(plan: Plan, rows: list[Row]) -> np.ndarray:
 
 def drawn_of(plan: Plan) -> dict[str, tuple[str, Units]]:
     """The quantities of the rows that are drawn: label and units by column."""
-    return dict(DRAWN if plan.slip_limit is None else DRAWN_OF_QUAKES)
+    return dict(DRAWN_OF_QUAKES if plan.quake else DRAWN)
 
 
 def panels_of(figure: Figure, table: Table) -> Iterator[tuple[Axes, str, tuple[str, Units]]]:
@@ -193,7 +194,7 @@ def panels_of(figure: Figure, table: Table) -> Iterator[tuple[Axes, str, tuple[s
     if plan.critical:
         words, size = quantity(plan.critical)
         drawn = {plan.critical_columns[0]: (f"critical {words}", ((size, 1),))}
-    elif plan.slip_limit is None:
+    elif not plan.quake:
         drawn[FACTOR] = FACTOR_LABEL, (("-", 1),)
     shape = (2, 2) if len(drawn) > 1 else (1, 1)
     panels = figure.subplots(*shape, squeeze=False).ravel()
@@ -214,7 +215,7 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
     curves = table.curves(np.argsort(x, kind="stable"), others)
     bad = is_marked(plan, table.rows)
     # of a static row that fails the last state is at another level: it would set the scale
-    valued = bool(plan.critical) or plan.slip_limit is not None
+    valued = bool(plan.critical or plan.quake)
     for panel, drawn, (words, units) in panels_of(figure, table):
         values = table.values(drawn)
         if drawn == OPENING:  # of a joint that is closed everywhere it is an overlap
@@ -243,8 +244,9 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
         panel.grid(alpha=0.3)
         if drawn == FACTOR:
             draw_verdicts(panel, table, x, values)
-        if drawn == SLIP and plan.slip_limit is not None:
-            draw_limit(panel, plan.slip_limit * factor, np.nanmin(values, initial=0.0) < 0)
+        if drawn == SLIP and plan.quake and plan.quake.slip:
+            least = np.nanmin(values, initial=0.0)
+            draw_limits(panel, [v * factor for v in plan.quake.slip], least < 0)
         if np.nan_to_num(shown).any():
             widen(panel.yaxis)
         else:
@@ -300,11 +302,10 @@ def draw_verdicts(panel: Axes, table: Table, x: np.ndarray, values: np.ndarray) 
     panel.legend(*zip(*shown, strict=True), fontsize=8)
 
 
-def draw_limit(panel: Axes, limit: float, both: bool) -> None:
-    """Draw the slip beyond which a row fails, in the panel's unit; both: in both directions."""
-    for side in (1, -1)[: 1 + both]:
-        words = "limit" if side == 1 else None
-        panel.axhline(side * limit, color="black", linestyle="--", lw=0.9, label=words)
+def draw_limits(panel: Axes, limits: list[float], both: bool) -> None:
+    """Draw slips beyond which a row fails, in the panel's unit; both: in both directions."""
+    for line in (side * limit for side in (1, -1)[: 1 + both] for limit in limits):
+        panel.axhline(line, color="black", linestyle="--", lw=0.9, label="limit")
     panel.legend(*[parts[-1:] for parts in panel.get_legend_handles_labels()], fontsize=8)
 
 
@@ -315,7 +316,7 @@ def draw_maps(figure: Figure, table: Table, names: list[str]) -> None:
     (across, i), (up, j) = (np.unique(v, return_inverse=True) for v in (x, y))
     bad = is_marked(plan, rows)
     for panel, column, (quantity_drawn, units) in panels_of(figure, table):
-        hidden = bad & (plan.slip_limit is None)
+        hidden = bad & (plan.quake is None)
         values = np.where(hidden, np.nan, table.values(column))
         values = np.maximum(values, 0.0) if column == OPENING else values
         size, factor = unit([np.nan_to_num(values)], units)
@@ -373,7 +374,7 @@ def draw_sample(figure: Figure, table: Table, names: list[str]) -> None:
     plan, rows = table.plan, table.rows
     inputs = sensitivities(plan, rows)
     drawn = drawn_of(plan)
-    other = "max_opening" if plan.slip_limit is None else SLIP
+    other = SLIP if plan.quake else "max_opening"
     outcome = "failed" if 0 < fails(rows).sum() < len(rows) else other
     ranks = np.nan_to_num([row[outcome] for row in inputs])
     strongest = [inputs[i]["input"] for i in np.argsort(-np.abs(ranks))]

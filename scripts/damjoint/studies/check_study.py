@@ -18,13 +18,17 @@ from ..post.tables import write_csv
 from ..runner import run
 from ..session import finished, several
 from ..statics.gravity import GravityMethod
+from . import sensitivity
 from .check import CHECK, SafetyCheck, compare_joints, hand_calculation
 from .check_tables import joints_table, picture_table
 from .keys import key_of
 
 
-def check_cases(cases: list[Case], out: Path, jobs: int | None = None) -> list[SafetyCheck]:
-    """Run cases, each into its folder below out, and check them; jobs: number of processes.
+def check_cases(
+    cases: list[Case], out: Path, jobs: int | None = None, derivatives: str = ""
+) -> list[SafetyCheck]:
+    """Run cases, each into its folder below out, and check them; jobs: number of processes;
+    derivatives: parameters with which the factors are differentiated, as `--sensitivity`.
 
     Writes check.csv into out after each case; gravity.csv and CASE_check.png into each scene's
     folder, but not for a user's own geometry. Cases that have come to their end are not computed
@@ -32,10 +36,12 @@ def check_cases(cases: list[Case], out: Path, jobs: int | None = None) -> list[S
     """
     names = [case.name for case in cases]
     for case in cases:
+        if derivatives:
+            sensitivity.names_of(case, derivatives, geometry=True)
         if names.count(case.name) > 1:
             raise InputError(f"case {case.name}: must be given once, and have its own name")
         engine_of(case, "auto")
-    tasks, checks = {out / case.name: (case, out / case.name) for case in cases}, []
+    tasks, checks = {out / case.name: (case, out / case.name, derivatives) for case in cases}, []
     for of_cases in several(check_case, tasks, out, jobs, "check"):
         checks = [check for of_case in of_cases for check in of_case]
         rows = [row for check in checks for row in check.rows]
@@ -43,16 +49,23 @@ def check_cases(cases: list[Case], out: Path, jobs: int | None = None) -> list[S
     return checks
 
 
-def check_case(task: tuple[Case, Path], progress: bool) -> list[SafetyCheck]:
+def check_case(task: tuple[Case, Path, str], progress: bool) -> list[SafetyCheck]:
     """Run a case into a folder, or read its results of an earlier command, and check it."""
-    case, out = task
-    key = key_of(case, case.accuracy, case.also_uplift)
+    case, out, derivatives = task
+    further = [derivatives] if derivatives else []
+    key = key_of(case, case.accuracy, case.also_uplift, *further)
     folder_of = partial(folders.scene_folder, case, out=out)
     results = list[Results]()
     with contextlib.suppress(InputError):  # a file is missing or damaged
         if finished(out, key):
             results = [stored.read(folder_of(scene)).result for scene in case.scenes()]
-    results = results or run(case, out, progress=progress, key=key)
+    if not results:
+        options: dict[str, Any] = {}
+        if derivatives:
+            names = sensitivity.names_of(case, derivatives, geometry=True)
+            printed = sensitivity.PRINTED_OF_CHECKS
+            options["further"] = partial(sensitivity.write, names, True, printed=printed)
+        results = run(case, out, progress=progress, key=key, **options)
     checks = list[SafetyCheck]()
     for result in results:
         of_joints = compare_joints(result)

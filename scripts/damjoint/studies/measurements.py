@@ -84,12 +84,21 @@ class Measurements:
         return varied(case, {}, self.levels, self.tail_levels, 1)
 
     def computed(self, case: Case) -> Array:
-        """What a run of a loaded case has in place of each measurement (series, readings).
+        """What a run of a loaded case has in place of each measurement, see `of_run`."""
+        return self.of_run(self.run_of(case))
+
+    @staticmethod
+    def run_of(case: Case) -> LoadStepper:
+        """The run of a loaded case."""
+        stepper = LoadStepper(case, interface_of(case))
+        stepper.run()
+        return stepper
+
+    def of_run(self, stepper: LoadStepper) -> Array:
+        """What a run has in place of each measurement (series, readings).
 
         Raises RunError if the dam has no equilibrium at one of the readings.
         """
-        stepper = LoadStepper(case, interface_of(case))
-        stepper.run()
         results = stepper.results()
         last = results.last.get("time", 0.0)
         if last < self.times[-1]:

@@ -54,7 +54,7 @@ def sensitivities(plan: Plan, rows: list[Row]) -> list[dict[str, Value]]:
     table: list[dict[str, Value]] = []
     for values, sample in groups(plan, rows, independent=True):
         stand = np.array([row["failed"] == "0" for row in sample])
-        static = plan.slip_limit is None
+        static = plan.quake is None
         results = {o: numbers(sample, o) for o in (FAILED, *(STATIC if static else OF_QUAKES))}
         for outcome in STATIC if static else ():
             results[outcome][~stand] = np.nan
@@ -71,7 +71,7 @@ def indices(plan: Plan, rows: list[Row]) -> list[dict[str, Value]]:
     outcomes that all rows have; of the failure always.
     """
     table: list[dict[str, Value]] = []
-    number, static = len(plan.sampled), STATIC if plan.slip_limit is None else OF_QUAKES
+    number, static = len(plan.sampled), OF_QUAKES if plan.quake else STATIC
     for values, sample in groups(plan, rows):
         for outcome in (FAILED, *static, *plan.critical_columns[:1]):
             y = numbers(sample, outcome)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -16,10 +17,13 @@ from ..arrays import Array, Settings, Value, Values
 from ..input import parameters
 from ..input.arithmetic import arithmetic_value, explained, quantity
 from ..input.case import Case
-from ..input.resolve import varied
+from ..input.resolve import varied, with_record
 
 #: A row of a result file: texts by column.
 Row: TypeAlias = dict[str, str]
+
+#: The name by which records of earthquakes are varied.
+MOTION = "record"
 
 #: Limit of the number of rows.
 MOST_ROWS = 1_000_000
@@ -107,10 +111,12 @@ class Sample:
 
 def checked(name: str, value: Value) -> Value:
     """The value of a row, from a text or a number; name: a parameter, one of a single
-    joint or level.
+    joint, level or record.
 
     Raises InputError.
     """
+    if name == MOTION:
+        return str(value)
     if name != "level":
         if "." in name:
             return parameters.of_one_joint(name, value)[2]
@@ -190,6 +196,64 @@ def sample_of(
 
 
 @dataclass(frozen=True)
+class Limits:
+    """Limits of an earthquake: of the residual slip and of the largest opening of the joint with
+    the largest slip [m]. That the dam does not stand is always one.
+    """
+
+    slip: tuple[float, ...] = ()
+    opening: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        values = [*self.slip, *self.opening]
+        if not all(math.isfinite(value) and value > 0 for value in values):
+            raise InputError(f"quake = {', '.join(map(str, values))}: must be lengths > 0 m")
+
+    @classmethod
+    def of(cls, text: str) -> Limits:
+        """Limits from a text SLIP, or "slip=0.05,slip=0.2,opening=0.01,standing".
+
+        Raises InputError.
+        """
+        bad = InputError(
+            f"--quake {text}: must be a slip > 0 m, or limits slip=S,opening=O,standing, some of "
+            "these or several of a kind"
+        )
+        found: dict[str, tuple[float, ...]] = {"slip": (), "opening": ()}
+        for part in text.split(","):
+            if part.strip() == STANDING:
+                continue
+            name, equals, words = (p.strip() for p in part.partition("="))
+            name, words = (name, words) if equals else ("slip", name)
+            try:
+                value = quantity(words)
+            except ValueError:
+                raise bad from None
+            if name not in found or not (math.isfinite(value) and value > 0):
+                raise bad
+            found[name] = (*found[name], value)
+        return cls(**found)
+
+    @property
+    def listed(self) -> list[tuple[str, float]]:
+        """Kind and value [m] of each limit, the last one that the dam does not stand."""
+        kinds = [("slip", v) for v in self.slip] + [("opening", v) for v in self.opening]
+        return [*dict.fromkeys(kinds), (STANDING, 0.0)]
+
+    def words(self) -> list[str]:
+        """What each limit means."""
+        names = {"slip": "residual slip", "opening": "opening"}
+        return [
+            f"{names[kind]} > {1e3 * v:.4g} mm" if kind in names else "does not stand"
+            for kind, v in self.listed
+        ]
+
+
+#: The limit that the dam does not stand after an earthquake.
+STANDING = "standing"
+
+
+@dataclass(frozen=True)
 class Plan:
     """The values of a sweep: all combinations of the varied ones, each with the entire sample."""
 
@@ -199,8 +263,8 @@ class Plan:
     tied: dict[str, str]
     #: quantity whose critical value is computed: level, strength, uplift, a parameter; empty: none
     critical: str = ""
-    #: residual slip [m] beyond which a row fails, each row an earthquake; None: no earthquake
-    slip_limit: float | None = None
+    #: limits beyond which a row fails, each row an earthquake; None: no earthquake
+    quake: Limits | None = None
     #: number of rows of a block in the design of Sobol's indices; 0: another design
     sobol: int = 0
 
@@ -241,6 +305,7 @@ def numbers(rows: list[Row], column: str) -> Array:
 CHART, STATISTICS = ".png", ("_probability.csv", "_sensitivity.csv", "_sobol.csv")
 #: Ending of the record of a study beside its result file.
 RECORD = "_run.json"
+FRAGILITY = "_fragility.csv", "_fragility.png"
 
 
 def beside(out: Path, ending: str) -> Path:
@@ -263,14 +328,19 @@ def tie(name: str, expression: str, row: Values) -> Value:
 
 
 def plan_of(
-    vary: list[str], tied: list[str], sample: Sample | None, settings: Settings, critical: str = ""
+    vary: list[str],
+    tied: list[str],
+    sample: Sample | None,
+    settings: Settings,
+    critical: str = "",
+    motions: Mapping[str, list[Value]] = MappingProxyType({}),
 ) -> Plan:
     """The plan of the texts NAME=VALUES, NAME=EXPRESSION and a sample; settings: parameters that
-    are set for all rows; critical: as in Plan.
+    are set for all rows; critical: as in Plan; motions: further values by name, of earthquakes.
 
     Raises InputError.
     """
-    axes = [values_of(text) for text in vary]
+    axes = [*(values_of(text) for text in vary), *motions.items()]
     ties = []
     for text in tied:
         name, _, expression = (part.strip() for part in text.partition("="))
@@ -311,6 +381,19 @@ def plan_with(
     return Plan(dict(axes), sample.values() if sample else {}, dict(ties), critical, sobol=sobol)
 
 
+def in_both_signs(plan: Plan) -> Plan:
+    """The plan with each record also reversed: record_scale has its values and their negatives.
+
+    Raises InputError if they are not listed.
+    """
+    scales = plan.varied.get("record_scale")
+    if scales is None:
+        raise InputError("--both-signs: must not be given with a sampled or tied record_scale")
+    values = [abs(float(scale)) for scale in scales]
+    both: list[Value] = [*dict.fromkeys([*values, *(-value for value in values)])]
+    return replace(plan, varied={**plan.varied, "record_scale": both})
+
+
 def cases_of(base: Case, plan: Plan) -> Iterator[tuple[dict[str, Value], Case]]:
     """The values of each row, and the case with them.
 
@@ -323,9 +406,10 @@ def cases_of(base: Case, plan: Plan) -> Iterator[tuple[dict[str, Value], Case]]:
         alone = {n: v for n, v in row.items() if n in independent}
         key = tuple(v for n, v in row.items() if n not in alone)
         if key not in resolved:
-            changed = {n: v for n, v in row.items() if n != "level"}
+            changed = {n: v for n, v in row.items() if n not in ("level", MOTION)}
             loading = up_to(base, row["level"]) if "level" in row else {}
-            resolved[key] = varied(base, changed, **loading)
+            of_row = varied(base, changed, **loading)
+            resolved[key] = with_record(of_row, str(row[MOTION])) if MOTION in row else of_row
         yield row, resolved[key].changed(alone)
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..arrays import Array
 from ..arrays import Table as Columns
+from ..dynamics import ground_motion
 from ..input.case import Case
 from ..mesh.mesh import Mesh
 from ..model.fields import Field
@@ -212,6 +213,19 @@ def damping_of(summary: dict[str, Any]) -> str:
     return f"Rayleigh damping set to {100 * ratio:.3g} % at {first:.3g} and {second:.3g} Hz: {acts}"
 
 
+def ground(summary: dict[str, Any]) -> str:
+    """The intensities of the ground motion of a summary."""
+    of, first = summary["ground"], summary["frequencies"][0]
+    spectrum = [(1 / first, of["spectral_ax"]), *of["spectrum"]]
+    values = ", ".join(f"{value:.3g} at {period:.3g} s" for period, value in spectrum)
+    return (
+        f"ground motion along x: largest acceleration {of['peak_ground_ax']:.3g} m/s2, velocity "
+        f"{of['peak_ground_vx']:.3g} m/s, Arias' intensity {of['arias_x']:.3g} m/s; spectral "
+        f"acceleration (damping {ground_motion.DAMPING:.0%}) [m/s2], first at the dam's first "
+        f"period: {values}"
+    )
+
+
 #: Columns of the table of the joints that a narrow table leaves out, in this order.
 LESS = "broken", "open", "residual tilt", "toe"
 
@@ -231,5 +245,5 @@ def text(case: Case, summary: dict[str, Any], width: int | None = None) -> str:
     else:
         rest = residual_table(summary, case)
         parts.append(aligned(rest.rows, rest.heads, left=2))
-    lines = [*(f"note: {note}" for note in summary["notes"]), modes(summary)]
+    lines = [*(f"note: {note}" for note in summary["notes"]), modes(summary), ground(summary)]
     return "\n\n".join(["\n".join(lines), *parts])

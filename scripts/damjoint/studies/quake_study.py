@@ -27,7 +27,6 @@ from . import quake, quake_getdp, quake_summary
 from .plan import in_file
 from .quake import Checkpoint, Span
 from .quake_result import QuakeResult, QuakeTables
-from .quake_summary import QUAKE_COLUMNS
 
 #: Files of an earthquake: rows, tables of the joints in the frames, stress along the first joint in
 #: time, the run under way.
@@ -182,8 +181,14 @@ def run_record(task: tuple[Case, Path, Options], progress: bool) -> Ended:
 
 
 #: Columns of the printed table of several earthquakes, and their headings.
-SHOWN = ("folder", *QUAKE_COLUMNS, "verdict")
-HEADS = "record", "ground\n[m/s2]", "residual\nslip [m]", "tilt", "rigid\nblock [m]", "verdict"
+SHOWN = (
+    *("folder", "peak_ground_ax", "peak_ground_vx", "arias_x", "spectral_ax"),
+    *("residual_slip", "residual_tilt", "rigid_block_slip", "peak_opening", "verdict"),
+)
+HEADS = (
+    *("record", "ground\n[m/s2]", "\n[m/s]", "Arias\n[m/s]", "Sa(T1)\n[m/s2]"),
+    *("residual\nslip [m]", "tilt", "rigid\nblock [m]", "opening\n[m]", "verdict"),
+)
 
 
 def records_table(results: Sequence[Ended], width: int | None = None) -> str:
@@ -194,5 +199,5 @@ def records_table(results: Sequence[Ended], width: int | None = None) -> str:
         [v if isinstance(v, str) else f"{v:.4g}" for v in (r.row[name] for name in SHOWN)]
         for r in results
     ]
-    less = "rigid_block_slip", "residual_tilt", "peak_ground_ax"
+    less = SHOWN[7], SHOWN[6], SHOWN[8], *SHOWN[4:0:-1]
     return fitted(SHOWN, HEADS, cells, less, width, partial(aligned, left=1))

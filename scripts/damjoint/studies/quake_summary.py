@@ -10,6 +10,8 @@ import numpy as np
 
 from .. import ROUND_OFF
 from ..arrays import Array, Table, Value
+from ..dynamics import ground_motion
+from ..dynamics.record import Record
 from ..dynamics.stepper import Earthquake
 from ..input.case import Case
 from ..model.results import column_of
@@ -41,12 +43,29 @@ PEAKS_OF_JOINTS = ("heel_opening", "toe_opening", "slip_mean", "open_length", "b
 #: The same with quake_uplift = transient.
 PEAKS_OF_WATER = "p_max", "void", "Re"
 
-#: Columns of an earthquake in a table of several: largest ground acceleration along x [m/s2]; of
-#: the joint with the largest slip: residual slip [m] and tilt, slip of the rigid block [m].
-QUAKE_COLUMNS = ("peak_ground_ax", "residual_slip", "residual_tilt", "rigid_block_slip")
-QUAKE_UNITS = dict(zip(QUAKE_COLUMNS, ("m/s2", "m", "-", "m"), strict=True))
-#: Those by their names in the summary of an earthquake; empty if the dam is not at rest.
-RESIDUAL = dict(zip(("slip", "tilt", "rigid_block"), QUAKE_COLUMNS[1:], strict=True))
+#: Those of the joint with the largest slip by their names in the summary of an earthquake: residual
+#: slip [m] and tilt, slip of the rigid block [m]; empty if the dam is not at rest.
+RESIDUAL = {"slip": "residual_slip", "tilt": "residual_tilt", "rigid_block": "rigid_block_slip"}
+#: Intensities of the ground motion along x: largest acceleration and velocity, Arias' intensity,
+#: pseudo-acceleration of an oscillator with the dam's first period, and their units.
+INTENSITIES = {
+    "peak_ground_ax": "m/s2",
+    "peak_ground_vx": "m/s",
+    "arias_x": "m/s",
+    "spectral_ax": "m/s2",
+}
+#: Periods of the spectrum in a summary [s].
+PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0)
+
+#: Columns of an earthquake in a table of several, with their units; the slip at the end, also of a
+#: dam that is not at rest, and the largest opening are those of the same joint.
+QUAKE_UNITS = {
+    **dict(zip(("peak_ground_ax", *RESIDUAL.values()), ("m/s2", "m", "-", "m"), strict=True)),
+    "end_slip": "m",
+    "peak_opening": "m",
+    **INTENSITIES,
+}
+QUAKE_COLUMNS = tuple(QUAKE_UNITS)
 
 #: Normal force over its largest value up to which a joint that is open throughout carries none.
 UNLOADED = 1e-3
@@ -83,6 +102,7 @@ def summary(quake: Earthquake, rows: Table, halvings: int) -> dict[str, Any]:
         "modes": [asdict(mode) for mode in quake.modes],
         "damping": asdict(quake.damping),
         "quake_uplift": quake.case["quake_uplift"],
+        "ground": intensities(quake.record, 1 / quake.frequencies[0]),
         "notes": notes(quake),
     }
     if not number:
@@ -107,6 +127,19 @@ def summary(quake: Earthquake, rows: Table, halvings: int) -> dict[str, Any]:
         words = map(turbulence, quake.case.joints, flows)
         result["notes"] += [f"{text}{of(quake.case, k)}" for k, text in enumerate(words) if text]
     return result | {"peaks": peaks} | values_at_end(quake.case, rows, 1 / quake.frequencies[0])
+
+
+def intensities(record: Record, period: float) -> dict[str, Any]:
+    """INTENSITIES of a record, its spectrum at PERIODS; period: the first one of the dam [s]."""
+    times, along = record.times, record.acceleration[:, 0]
+    first, *others = ground_motion.spectrum(times, along, np.array([period, *PERIODS])).tolist()
+    return {
+        "peak_ground_ax": float(np.abs(along).max()),
+        "peak_ground_vx": float(np.abs(record.velocity(times)[:, 0]).max()),
+        "arias_x": float(ground_motion.arias_growth(times, along)[-1]),
+        "spectral_ax": first,
+        "spectrum": [list(pair) for pair in zip(PERIODS, others, strict=True)],
+    }
 
 
 def lift_off(quake: Earthquake, rows: Table, number: int) -> str:
@@ -206,7 +239,11 @@ def columns(case: Case, summary: dict[str, Any]) -> dict[str, Value]:
     """QUAKE_COLUMNS of a summary; empty where a value is not known."""
     residual, worst = summary["residual"], largest_slip(case, summary)
     slips = {column: residual.get(column_of(name, worst), "") for name, column in RESIDUAL.items()}
-    return {"peak_ground_ax": abs(summary["peaks"]["ground_ax"]["value"]), **slips}
+    openings = (summary["peaks"][column_of(n, worst)] for n in ("heel_opening", "toe_opening"))
+    opening = max(0.0, *(peak["value"] for peak in openings))
+    end = summary["end"][column_of("slip", worst)]
+    row = {**slips, "end_slip": end, "peak_opening": opening, **summary["ground"]}
+    return {name: row[name] for name in QUAKE_COLUMNS}
 
 
 def largest_slip(case: Case, summary: dict[str, Any]) -> int:

@@ -4,8 +4,9 @@ The limit state is g = critical level - level [m]; the dam fails where g < 0. It
 standard normal ones z, which follow from the uncertain parameters and have the correlation of a
 Gaussian copula, as in a sample. The algorithms are those of OpenTURNS: FORM by the design point,
 the nearest one of failure [Hasofer and Lind 1974; Abdo and Rackwitz 1990], SORM [Breitung 1984;
-Tvedt 1990], importance sampling around the design points [Melchers 1989]. Derivatives are central
-differences of critical levels.
+Tvedt 1990], importance sampling around the design points [Melchers 1989]. Derivatives are those of
+the critical levels, by direct differentiation; where a level has none, as one that a mechanism or
+a path of another mesh gives, central differences.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import numpy as np
 from scipy import stats
 
 from .. import InputError, RunError
-from ..arrays import Value, Values
+from ..arrays import Array, BoolArray, Value, Values
 from ..input.case import Case
 from ..input.resolve import varied
 from ..joint.interface import interface_of
@@ -31,11 +32,18 @@ from ..solver.path import PRECISION
 from ..threads import limited_threads
 from . import keys, sampling
 from .critical import Search
+from .critical_value import CriticalValue
 from .plan import Plan, Sample, cases_of, checked, in_file, rounded, up_to
 from .sweep import ERROR, message_of, search_of, spread_bundles
 
-#: Step of the central differences, in standard deviations of the normal variables [-].
+#: Step of the central differences of levels, and of their derivatives for the curvatures, in
+#: standard deviations of the normal variables [-].
 STEP = 0.1
+#: Level of a point over the critical level from which on its derivatives are not those of the
+#: critical level, relative [-].
+SAME_LEVEL = 1e-5
+#: Half of the difference of an expression, over the value of a variable [-].
+OF_EXPRESSIONS = 1e-4
 
 #: Tolerance of the design point, in standard deviations and relative [-], and of its limit state
 #: [m]; if that is not reached, the precision of a critical level is the tolerance.
@@ -106,7 +114,7 @@ class Variables:
         """Their distributions."""
         return [sampling.distribution(n, text) for n, text in self.distributions.items()]
 
-    def values(self, z: Sequence[float]) -> dict[str, float]:
+    def values(self, z: Sequence[float] | Array) -> dict[str, float]:
         """The values by name at a point of the normal variables, also in far tails.
 
         Raises InputError if a parameter does not allow its value.
@@ -123,6 +131,14 @@ class Variables:
                     "or lognorm keep within bounds"
                 ) from None
         return result
+
+    def slopes(self, z: Sequence[float] | Array) -> dict[str, float]:
+        """The derivatives of the values with the normal variables, by name."""
+        values = self.values(z)
+        return {
+            name: float(stats.norm.pdf(number) / kind.pdf(values[name]))
+            for name, kind, number in zip(self.names, self.marginals, z, strict=True)
+        }
 
     def normal(self) -> Any:
         """The joint distribution of the normal variables, of OpenTURNS.
@@ -156,18 +172,20 @@ def checked_name(name: str) -> None:
 # --------------------------------------------------------------------------------------------------
 
 
-def rows_of(cases: list[Case]) -> list[dict[str, Value]]:
-    """The columns RESULTS of cases, each a critical level; a failed search has an empty one."""
+def rows_of(tasks: list[tuple[Case, list[str]]]) -> list[dict[str, Value]]:
+    """The columns RESULTS of cases, each a critical level, and its derivatives with parameters by
+    their names, if it has them; a failed search has an empty level.
+    """
     with limited_threads(1):
-        return [row_of(case) for case in cases]
+        return [row_of(case, names) for case, names in tasks]
 
 
-def row_of(case: Case) -> dict[str, Value]:
+def row_of(case: Case, names: list[str]) -> dict[str, Value]:
     """The columns of a critical level: that of the highest path that was followed where there is
-    no limit, 0 where there is no equilibrium at any level.
+    no limit, 0 where there is no equilibrium at any level; and its derivatives.
     """
     try:
-        search = search_of(case, "level")
+        search = search_of(replace(case, all_steps=bool(names)), "level")
         answer = search.find()
         if answer.value is None and answer.point is None:
             search = lower(case)
@@ -178,7 +196,32 @@ def row_of(case: Case) -> dict[str, Value]:
     if level is None:
         level = answer.point.level if answer.point else 0.0
     cells = level, answer.mode, answer.joint, float(answer.confirmed), answer.why or answer.doubt
-    return dict(zip(RESULTS, cells, strict=True))
+    row: dict[str, Value] = dict(zip(RESULTS, cells, strict=True))
+    return row | (rates_of(answer, names) if names else {})
+
+
+def rates_of(answer: CriticalValue, names: list[str]) -> dict[str, Value]:
+    """The derivatives of a critical level with parameters, by their names; none where its point has
+    none, is at a kink or has another level.
+    """
+    from .sensitivity import of_point
+
+    if answer.point is None or answer.value is None:
+        return {}
+    if abs(answer.point.level - answer.value) > SAME_LEVEL * abs(answer.value):
+        return {}
+    try:
+        rows = of_point(answer.point, names)
+    except (InputError, RunError, np.linalg.LinAlgError):
+        return {}
+    if any(row.kink for row in rows):
+        return {}
+    return {rate_column(row.name): row.derivatives["critical_level"] for row in rows}
+
+
+def rate_column(name: str) -> str:
+    """The column of the derivative with a parameter."""
+    return f"d_{name}"
 
 
 def lower(case: Case) -> Search:
@@ -229,22 +272,61 @@ class CriticalLevels:
         of_joint = name.rpartition(".")[0]
         return name != "level" and (not joint or of_joint in ("", joint))
 
-    def of(self, joint: str, rows: Sequence[Values]) -> list[Mapping[str, Value]]:
-        """The results for rows of values. Raises InputError, RunError."""
+    def rates(self, joint: str, row: Values) -> dict[str, float] | None:
+        """The derivatives of the critical level with the variables, at values at which it is known;
+        None if it has none there. Raises InputError.
+        """
+        chosen = {n: v for n, v in row.items() if self.matters(joint, n)}
+        found = self.known[keys.key_of(self.case_of(joint, chosen), "reliability")]
+        names = self.differentiated(joint)
+        texts = [found.get(rate_column(name), "") for name in names]
+        if "" in texts:
+            return None
+        given = dict(zip(names, map(float, texts), strict=True))
+        result = {}
+        for name, value in ((n, float(v)) for n, v in chosen.items()):
+            step = OF_EXPRESSIONS * abs(value) or OF_EXPRESSIONS
+            ends = [self.tied(chosen | {name: value + s}) for s in (-step, step)]
+            slopes = {n: (ends[1][n] - ends[0][n]) / (2 * step) for n in ends[0]}
+            of_tied = (given[n] * slope for n, slope in slopes.items() if n in given)
+            result[name] = given.get(name, 0.0) + sum(of_tied)
+        return result
+
+    def tied(self, values: Values) -> dict[str, float]:
+        """The values of the expressions of variables. Raises InputError."""
+        plan = Plan({}, {n: [v] for n, v in values.items()}, dict(self.variables.tied))
+        return {n: float(v) for n, v in next(plan.rows()).items() if n in self.variables.tied}
+
+    def differentiated(self, joint: str) -> list[str]:
+        """The parameters with which the level is differentiated."""
+        names = [*self.variables.names, *self.variables.tied]
+        return [name for name in names if self.matters(joint, name)]
+
+    def of(
+        self, joint: str, rows: Sequence[Values], rates: bool = False
+    ) -> list[Mapping[str, Value]]:
+        """The results for rows of values; rates: with derivatives. Raises InputError, RunError."""
+        further = self.differentiated(joint) if rates else []
         chosen = [{n: v for n, v in row.items() if self.matters(joint, n)} for row in rows]
         cases = [self.case_of(joint, values) for values in chosen]
         names = [keys.key_of(case, "reliability") for case in cases]
-        tasks = {k: c for k, c in zip(names, cases, strict=True) if k not in self.known}
+        column = rate_column(further[0]) if further else "critical_level"
+        tasks = {
+            key: (case, further)
+            for key, case in zip(names, cases, strict=True)
+            if column not in self.known.get(key, {})
+        }
         values_of = dict(zip(names, chosen, strict=True))
         if tasks:
-            interface_of(next(iter(tasks.values())))  # condensed before the processes start
+            interface_of(next(iter(tasks.values()))[0])  # condensed before the processes start
             jobs, work = number_of(self.jobs, len(tasks)), [[key] for key in tasks]
             for key, result in spread_bundles(rows_of, work, tasks, jobs, self.scheduler):
                 self.computed += 1
                 self.on_row(key, joint, values_of[key], result)
                 # as the file has it: a study that continues takes the same points
-                level = result["critical_level"]
-                rest = {} if level == "" else {"critical_level": rounded(float(level))}
+                numbers = ["critical_level", *map(rate_column, further)]
+                found = {n: result.get(n, "") for n in numbers}
+                rest = {n: v if v == "" else rounded(float(v)) for n, v in found.items()}
                 self.known[key] = {**result, **rest}
         results = [self.known[key] for key in names]
         self.used |= dict(zip(names, results, strict=True))
@@ -268,20 +350,53 @@ class LimitState:
         self.levels, self.joint = levels, joint
         #: what has ended an evaluation, which OpenTURNS would replace
         self.error: BaseException | None = None
+        #: whether levels are computed with their derivatives
+        self.with_rates = True
         ot, number = openturns(), len(levels.variables.names)
-        self.function = ot.Function(ot.PythonFunction(number, 1, func_sample=self.evaluated))
-        steps, evaluation = ot.Point([STEP] * number), self.function.getEvaluation()
-        self.function.setGradient(ot.CenteredFiniteDifferenceGradient(steps, evaluation))
-        self.function.setHessian(ot.CenteredFiniteDifferenceHessian(steps, evaluation))
+        parts = {"gradient": self.gradient, "hessian": self.hessian}
+        function = ot.PythonFunction(number, 1, func_sample=self.evaluated, **parts)
+        self.function = ot.Function(function)
 
-    def evaluated(self, points: Any) -> list[list[float]]:
-        """g at points; where its level is not known, the dam counts as failed."""
+    def gradient(self, point: Any) -> list[list[float]]:
+        """The derivatives (n, 1) of g with the normal variables at a point: by those of the
+        critical level, else central differences.
+        """
+        variables, z = self.levels.variables, np.asarray(point, float)
+        self.evaluated([z])
+        try:
+            rates = self.levels.rates(self.joint, variables.values(z))
+        except BaseException as error:
+            self.error = error
+            raise
+        if rates is None:
+            steps = STEP * np.eye(len(z))
+            values = np.ravel(self.evaluated([*(z + steps), *(z - steps)], False))
+            high, low = values.reshape(2, -1)
+            return [[float(slope)] for slope in (high - low) / (2 * STEP)]
+        slopes = variables.slopes(z)
+        of_level = {"level": -1.0}
+        return [[slopes[n] * (rates | of_level).get(n, 0.0)] for n in variables.names]
+
+    def hessian(self, point: Any) -> list[list[list[float]]]:
+        """The second derivatives (n, n, 1) of g: central differences of the first ones."""
+        z = np.asarray(point, float)
+        steps = STEP * np.eye(len(z))
+        self.evaluated([*(z + steps), *(z - steps)])  # in parallel
+        rows = [np.ravel(self.gradient(z + s)) - np.ravel(self.gradient(z - s)) for s in steps]
+        bends = np.array(rows) / (2 * STEP)
+        return [[[float(bend)] for bend in row] for row in (bends + bends.T) / 2]
+
+    def evaluated(self, points: Any, rates: bool | None = None) -> list[list[float]]:
+        """g at points; where its level is not known, the dam counts as failed. rates: whether
+        levels are computed with their derivatives (None: as said).
+        """
         if threading.current_thread() is threading.main_thread():
             # OpenTURNS has set its own while it runs, which ends a pool by a segmentation fault
             signal.signal(signal.SIGINT, signal.getsignal(signal.SIGINT))
         try:
             rows = [self.levels.variables.values(z) for z in np.asarray(points)]
-            results = self.levels.of(self.joint, rows)
+            rates = self.with_rates if rates is None else rates
+            results = self.levels.of(self.joint, rows, rates)
         except BaseException as error:
             self.error = error
             raise
@@ -419,24 +534,36 @@ def sampled(
     limit: LimitState, normal: Any, around: Sequence[Reliability], number: int, seed: int
 ) -> tuple[float, float, float]:
     """Probability of failure by importance sampling around design points, and the limits of its
-    interval. Raises InputError, RunError.
+    interval: that of a sum of weighted Poisson numbers [Fay and Feuer 1997], with the variance of
+    the weights. That of the normal distribution is too narrow above where few samples with large
+    weights decide. Raises InputError, RunError.
     """
     ot = openturns()
     deviations, matrix = normal.getStandardDeviation(), normal.getCorrelation()
     parts = [ot.Normal(list(one.point), deviations, matrix) for one in around]
     density = parts[0] if len(parts) == 1 else ot.Mixture(parts)
-    vector = ot.CompositeRandomVector(limit.function, ot.RandomVector(normal))
-    event = ot.ThresholdEvent(vector, ot.Less(), 0.0)
     ot.RandomGenerator.SetSeed(seed)
-    block = min(BLOCK, number)
-    experiment = ot.ImportanceSamplingExperiment(normal, density, block)
-    algorithm = ot.ProbabilitySimulationAlgorithm(event, experiment)
-    algorithm.setBlockSize(block)
-    algorithm.setMaximumOuterSampling(-(-number // block))
-    algorithm.setMaximumCoefficientOfVariation(0.0)
-    result = limit.run(algorithm)
-    share, width = result.getProbabilityEstimate(), result.getConfidenceLength(sampling.CONFIDENCE)
-    return share, max(share - width / 2, 0.0), min(share + width / 2, 1.0)
+    points = density.getSample(number)
+    logs = np.ravel(normal.computeLogPDF(points)) - np.ravel(density.computeLogPDF(points))
+    blocks = [points[i : i + BLOCK] for i in range(0, number, BLOCK)]
+    fails = np.concatenate([np.ravel(limit.evaluated(block, False)) < 0 for block in blocks])
+    return weighted_share(np.exp(logs), fails)
+
+
+def weighted_share(weights: Array, fails: BoolArray) -> tuple[float, float, float]:
+    """The mean weight of the samples that fail, weights (n,), and the limits of its interval."""
+    number, tail = len(weights), (1 - sampling.CONFIDENCE) / 2
+    share = float(np.mean(weights * fails))
+    variance = float(np.var(weights * fails, ddof=1)) / number if number > 1 else 0.0
+    largest = float((weights[fails] if fails.any() else weights).max()) / number
+    if not variance > 0:  # none or all fail, with equal weights
+        variance = float(np.sum((weights * fails) ** 2)) / number**2
+    low = 0.0
+    if share > 0:
+        low = variance / (2 * share) * float(stats.chi2.ppf(tail, 2 * share**2 / variance))
+    mean, spread = share + largest, variance + largest**2
+    high = spread / (2 * mean) * float(stats.chi2.isf(tail, 2 * mean**2 / spread))
+    return min(share, 1.0), low, min(high, 1.0)
 
 
 def analysed(
@@ -460,8 +587,7 @@ def analysed(
             on_progress(f"{where}{samples} samples")
             around = [s for s in (*([] if joint else single), result) if s.form] or [result]
             share = sampled(limit, normal, around, samples, seed)
-            number = -(-samples // min(BLOCK, samples)) * min(BLOCK, samples)
-            result = replace(result, sampled=share[0], low=share[1], high=share[2], samples=number)
+            result = replace(result, sampled=share[0], low=share[1], high=share[2], samples=samples)
         single.append(result)
         yield result
 
@@ -478,7 +604,9 @@ def design_case(levels: CriticalLevels, result: Reliability) -> Case:
 
 def columns_of(variables: Variables) -> list[str]:
     """The columns of reliability.csv."""
-    return ["key", "of_joint", *(n for n in variables.names if n != "level"), *RESULTS]
+    names = [n for n in variables.names if n != "level"]
+    rates = [rate_column(n) for n in (*names, *variables.tied)]
+    return ["key", "of_joint", *names, *RESULTS, *rates]
 
 
 def cells_of(
@@ -487,4 +615,5 @@ def cells_of(
     """A row of reliability.csv."""
     names = [n for n in variables.names if n != "level"]
     given = [in_file(values[n]) if n in values else "" for n in names]
-    return [key, joint, *given, *(in_file(result[n]) for n in RESULTS)]
+    rates = [result.get(rate_column(n), "") for n in (*names, *variables.tied)]
+    return [key, joint, *given, *(in_file(result[n]) for n in RESULTS), *map(in_file, rates)]

@@ -16,7 +16,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from .. import ROUND_OFF, InputError, RunError, __version__
-from ..dynamics.record import STANDARD_GRAVITY
+from ..dynamics.record_files import STANDARD_GRAVITY
 from ..input.case import Case
 from ..input.case_names import is_name
 from ..model.fields import Solution

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from ..arrays import Array
 from ..arrays import Table as Columns
 from ..dynamics import ground_motion
-from ..dynamics.record import STANDARD_GRAVITY, Record
+from ..dynamics.record import Record
+from ..dynamics.record_files import STANDARD_GRAVITY
 from ..input.case import Case
 from ..model.results import column_of
 from ..pictures.drawing import BLUE, DARK, ORANGE, figure_of, panels

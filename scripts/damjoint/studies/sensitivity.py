@@ -13,10 +13,18 @@ from .. import InputError, RunError
 from ..arrays import Value
 from ..input.case import Case
 from ..input.parameters import declared, parameter
+from ..input.resolve import varied
 from ..model.results import Results, with_all_joints
 from ..post.summary import aligned
 from ..post.tables import write_csv
-from ..solver.derivatives import NOT_CONTINUOUS, Differentiation, half_difference
+from ..solver.derivatives import (
+    FACTORS,
+    NOT_CONTINUOUS,
+    Differentiation,
+    Side,
+    half_difference,
+    history_row,
+)
 from ..solver.load_stepper import LoadStepper
 from ..solver.path import Point
 from ..threads import limited_threads
@@ -25,8 +33,12 @@ from ..units import with_slash
 #: The file of the derivatives of a run.
 FILE = "sensitivity.csv"
 
-#: Columns of history.csv that follow the parameters continuously: not lengths that count points.
-CONTINUOUS = ("crest_ux", "max_opening", "bonded_length", "N", "T", "M", "U", "x_resultant", "flux")
+#: Columns of history.csv that follow the parameters continuously, not lengths that count points;
+#: end of the crack, safety factors.
+CONTINUOUS = (
+    *("crest_ux", "max_opening", "crack_end", "bonded_length", "N", "T", "M", "U", "x_resultant"),
+    *("flux", *FACTORS),
+)
 
 #: Those that are printed, as changes by one percent of a parameter: name, unit, factor.
 PRINTED = (
@@ -45,10 +57,31 @@ SINGULAR = 1e3
 ALL = "all"
 
 
+#: The same in `damjoint check`.
+PRINTED_OF_CHECKS = (
+    *(("SSF", "-", 1.0), ("OSF", "-", 1.0)),
+    *(("x_resultant", "m", 1.0), ("crack_end", "m", 1.0)),
+)
+
+#: Loads with which the bodies are condensed.
+OF_BODIES = (
+    *("ice_force", "force_x", "force_y", "anchor_force"),
+    *("temperature_dam", "temperature_linear", "temperature_found"),
+)
+
+#: Groups of parameters without an effect on a run, but for some of them.
+WITHOUT_EFFECT, BUT = ("Earthquake", "Checks"), ("factor_mu", "factor_c")
+
+#: Half of the difference of a parameter of the geometry, whose derivatives are those of two runs,
+#: over its value [-]: so large that the difference between their meshes is small beside it.
+OF_GEOMETRY = 5e-3
+
+
 @dataclass(frozen=True)
 class Sensitivity:
     """Derivatives with a parameter, per its unit, by column; kink: whether they are one of several,
-    as a point of the joint is about to open, to slip or to break.
+    as a point of the joint is about to open, to slip or to break; of_runs: whether they are
+    differences of two runs.
     """
 
     name: str
@@ -56,6 +89,7 @@ class Sensitivity:
     level: float
     derivatives: Mapping[str, float]
     kink: bool
+    of_runs: bool = False
 
     @property
     def unit(self) -> str:
@@ -63,10 +97,10 @@ class Sensitivity:
         return parameter(self.name.rpartition(".")[2]).unit
 
 
-def names_of(case: Case, text: str) -> list[str]:
-    """Parameters from a text NAME,NAME,..., or all of a case.
+def names_of(case: Case, text: str, geometry: bool = False) -> list[str]:
+    """Parameters from a text NAME,NAME,..., or all of a case but those of the geometry.
 
-    Raises InputError if one of them has no derivative.
+    geometry: whether these are allowed. Raises InputError if one of them has no derivative.
     """
     if text.strip() == ALL:
         return all_of(case)
@@ -74,8 +108,17 @@ def names_of(case: Case, text: str) -> list[str]:
     for name in names:
         if not name or names.count(name) > 1:
             raise InputError(f"--sensitivity {text}: must be NAME,NAME,... or {ALL}, each once")
-        half_difference(case, name)
+        if not (geometry and is_of_geometry(case, name)):
+            half_difference(case, name)
     return names
+
+
+def is_of_geometry(case: Case, name: str) -> bool:
+    """Whether derivatives with a parameter are those of two runs."""
+    known = None if "." in name else parameter(name)
+    if not known or known.group != "Geometry" or known.text or known.choices or known.integer:
+        return False
+    return not case.geometry and isinstance(case[name], float) and case[name] != 0
 
 
 def all_of(case: Case) -> list[str]:
@@ -84,7 +127,11 @@ def all_of(case: Case) -> list[str]:
     for name, known in declared().items():
         if known.text or known.choices or known.integer or known.group in NOT_CONTINUOUS:
             continue
+        if known.group in WITHOUT_EFFECT and name not in BUT:
+            continue
         if not any(known.matters_in(joint.values) for joint in case.joints):
+            continue
+        if name in OF_BODIES and not case[name]:  # a load that does not act
             continue
         differs = known.of_joints and len({joint[name] for joint in case.joints}) > 1
         for one in [f"{j}.{name}" for j in case.joint_names] if differs else [name]:
@@ -106,16 +153,54 @@ def of_run(case: Case, names: Sequence[str]) -> list[Sensitivity]:
         updates = stepper.state.trace.updates
         saved = [state.time for state in stepper.history.saved]
         columns = list(with_all_joints(dict.fromkeys(CONTINUOUS, ("", "")), stepper.case))
+        others = [name for name in names if is_of_geometry(stepper.case, name)]
+        direct = [name for name in names if name not in others]
+        states = Differentiation(stepper.model, direct).along(updates)
+        ends = [max(i for i, u in enumerate(updates) if u.state.time == time) for time in saved]
         rows = []
-        for name in names:
+        for name in direct:
             value, *_ = half_difference(stepper.case, name)
-            states = Differentiation(stepper.model, name).along(updates)
-            for time in saved:
-                last = max(i for i, u in enumerate(updates) if u.state.time == time)
-                row, level = states[last].row(), updates[last].state.loading.level
-                given = {c: row[c] for c in columns if c in row}
-                rows.append(Sensitivity(name, value, float(level), given, states[last].kink))
+            for last in ends:
+                derivative, level = states[last][name], updates[last].state.loading.level
+                row = derivative.row()
+                given = {c: row[c] for c in columns if c in row and np.isfinite(row[c])}
+                rows.append(Sensitivity(name, value, float(level), given, derivative.kink))
+        for name in others:
+            rows += of_two_runs(stepper, name, columns)
     return rows
+
+
+def of_two_runs(stepper: LoadStepper, name: str, columns: Sequence[str]) -> list[Sensitivity]:
+    """Derivatives with a parameter of the geometry: central differences of two runs, at the levels
+    that both reach.
+
+    Raises InputError, RunError.
+    """
+    case = stepper.case
+    value = float(case[name])
+    sides = list[list[dict[str, float]]]()
+    for sign in (-1, 1):
+        other = varied(case, {name: value * (1 + sign * OF_GEOMETRY)})
+        other = replace(other, levels=case.levels, tail_levels=case.tail_levels, times=case.times)
+        run = LoadStepper(other)
+        run.run()
+        at_rest = run.history.at_rest
+        sides.append([history_row(Side(run.model, s, at_rest)) for s in run.history.saved])
+    return [
+        Sensitivity(
+            name,
+            value,
+            low["level"],
+            {
+                column: (high[column] - low[column]) / (2 * OF_GEOMETRY * value)
+                for column in columns
+                if column in low and np.isfinite([low[column], high[column]]).all()
+            },
+            kink=False,
+            of_runs=True,
+        )
+        for low, high in zip(*sides, strict=False)
+    ]
 
 
 def of_point(point: Point, names: Sequence[str]) -> list[Sensitivity]:
@@ -130,9 +215,8 @@ def of_point(point: Point, names: Sequence[str]) -> list[Sensitivity]:
         raise RunError("sensitivity: the path was followed without its updates")
     rows = []
     with limited_threads(1):
-        for name in names:
+        for name, end in Differentiation(point.model, names).along(trace.updates)[-1].items():
             value, *_ = half_difference(point.model.case, name)
-            end = Differentiation(point.model, name).along(trace.updates)[-1]
             if abs(end.level * value) > SINGULAR * point.level:
                 raise RunError(
                     "sensitivity: the critical level has no derivative: its last equilibrium is "
@@ -145,20 +229,27 @@ def of_point(point: Point, names: Sequence[str]) -> list[Sensitivity]:
 
 def table(rows: Sequence[Sensitivity]) -> dict[str, list[Value]]:
     """sensitivity.csv: a row per parameter and level."""
-    names = list(rows[0].derivatives) if rows else []
+    names = list(dict.fromkeys(name for row in rows for name in row.derivatives))
     return {
         "parameter": [row.name for row in rows],
         "unit": [row.unit for row in rows],
         "value": [row.value for row in rows],
         "level": [row.level for row in rows],
         "kink": [float(row.kink) for row in rows],
-        **{name: [row.derivatives[name] for row in rows] for name in names},
+        "of_runs": [float(row.of_runs) for row in rows],
+        **{name: [row.derivatives.get(name, np.nan) for row in rows] for name in names},
     }
 
 
-def write(names: Sequence[str], picture: bool, results: Results, folder: Path) -> None:
-    """Write the derivatives of a run into its folder, and their picture; what is printed of them is
-    added to its info.
+def write(
+    names: Sequence[str],
+    picture: bool,
+    results: Results,
+    folder: Path,
+    printed: Sequence[tuple[str, str, float]] = PRINTED,
+) -> None:
+    """Write the derivatives of a run into its folder, and their picture; what is printed of them,
+    as in `changes`, is added to its info.
     """
     try:
         rows = of_run(results.case, names)
@@ -166,7 +257,7 @@ def write(names: Sequence[str], picture: bool, results: Results, folder: Path) -
         results.info["sensitivity"] = {"statement": str(error), "changes": []}
         return
     write_csv(folder / FILE, {n: np.array(v) for n, v in table(rows).items()})
-    listed = changes(rows, PRINTED)
+    listed = changes(rows, printed)
     results.info["sensitivity"] = {"statement": "", "changes": listed}
     if picture:
         draw_changes(listed, results.case, rows[-1].level, folder)
@@ -189,6 +280,7 @@ def changes(
     of a parameter that is zero, its unit, after the others. Those without an effect are left out.
     """
     last = [row for row in rows if row.level == rows[-1].level]
+    printed = [entry for entry in printed if all(entry[0] in row.derivatives for row in last)]
     heads = [f"{name} [{unit}]" for name, unit, _ in printed]
     sizes = np.array(
         [
@@ -205,7 +297,8 @@ def changes(
         unit = with_slash(row.unit)
         cells: dict[str, Value] = {"parameter": row.name, "unit": unit, "value": row.value}
         cells |= dict(zip(heads, sizes[k].tolist(), strict=True))
-        listed.append(cells | {"at a kink": "yes" if row.kink else ""})
+        note = "at a kink" if row.kink else "of two runs" if row.of_runs else ""
+        listed.append(cells | {"note": note})
     return listed
 
 

@@ -12,13 +12,13 @@ from typing import Any, TypeAlias
 
 from .. import InputError, RunError, accuracy, runner
 from ..arrays import Value, Values
+from ..dynamics import record_files
 from ..input import parameters
 from ..input.case import Case
 from ..input.refinement import first_mesh
 from ..input.resolve import equal_steps, resolve, with_drive_times
 from ..input.source import Source
 from ..joint.interface import Interface, interface_of
-from ..model.results import column_of as column_of_joint
 from ..model.results import history_columns
 from ..post.summary import fitted
 from ..processes import ProcessKilled, as_finished, check_jobs, number_of
@@ -31,7 +31,18 @@ from ..statics.verdict import failed, verdict
 from ..threads import limited_threads
 from . import keys, quake, quake_summary
 from .critical import QUICK, Search
-from .plan import CHART, STATISTICS, Plan, Row, beside, cases_of, column_of, in_file
+from .plan import (
+    CHART,
+    FRAGILITY,
+    STATISTICS,
+    Limits,
+    Plan,
+    Row,
+    beside,
+    cases_of,
+    column_of,
+    in_file,
+)
 from .quake_summary import NO_FRICTION, NOT_AT_REST, QUAKE_COLUMNS
 from .result_file import rows_session
 
@@ -40,9 +51,9 @@ def key_of(case: Case, plan: Plan) -> str:
     """The key of a row in a result file: of all that decides it, and what a plan computes of it."""
     given = case.source.overrides if case.source else {}
     quick = sorted(QUICK.keys() & given.keys()) if plan.critical else []
-    others = [bool(plan.sampled), plan.critical, quick, plan.slip_limit]
-    if plan.slip_limit is not None and case.record:
-        others.append(case.record.read_bytes())
+    others = [bool(plan.sampled), plan.critical, quick, plan.quake and plan.quake.listed]
+    if plan.quake:
+        others.append(record_files.content_of(case.record, case.record_vertical))
     return keys.key_of(case, *others)
 
 
@@ -94,7 +105,7 @@ class Task:
     search: Callable[[], Search] | None = None
     columns: Sequence[str] = ()
     #: as in Plan
-    slip_limit: float | None = None
+    quake: Limits | None = None
 
 
 def last_rows(tasks: list[Task]) -> list[dict[str, Value]]:
@@ -104,7 +115,7 @@ def last_rows(tasks: list[Task]) -> list[dict[str, Value]]:
     solved: Solved = {}
     with limited_threads(1):
         return [
-            (last_row(task, solved) if task.slip_limit is None else quake_row(task))
+            (quake_row(task, task.quake) if task.quake else last_row(task, solved))
             | critical_value(task)
             for task in tasks
         ]
@@ -132,14 +143,14 @@ def last_row(task: Task, solved: Solved) -> dict[str, Value]:
     return row | result.last | dict(zip(OUTCOME, outcome, strict=True))
 
 
-#: The verdict of a row whose slip exceeds the limit.
-EXCEEDED = "residual slip"
+#: The verdicts of a row that exceeds a limit of one kind.
+EXCEEDED = {"slip": "residual slip", "opening": "opening"}
 
 
-def quake_row(task: Task) -> dict[str, Value]:
-    """The row of a case whose last level is followed by an earthquake: it fails if the residual
-    slip (or, if the dam is not at rest, that at the end) exceeds the limit, or if the dam does not
-    stand after it.
+def quake_row(task: Task, limits: Limits) -> dict[str, Value]:
+    """The row of a case whose last level is followed by an earthquake: it fails if it exceeds one
+    of the limits: the residual slip (or, if the dam is not at rest, that at the end), the opening,
+    or that the dam stands after it. A dam that does not stand exceeds all of them.
     """
     case = task.case
     row: dict[str, Value] = dict.fromkeys([*history_columns(case), *QUAKE_COLUMNS], "")
@@ -148,15 +159,30 @@ def quake_row(task: Task) -> dict[str, Value]:
     except Exception as error:
         return row | dict(zip(OUTCOME, (1.0, ERROR, message_of(error)), strict=True))
     row |= static.results().last | quake_summary.columns(case, summary)
-    worst = column_of_joint("slip", quake_summary.largest_slip(case, summary))
-    slip = abs(summary["residual" if summary["at_rest"] else "end"][worst])
     verdict, words = quake_summary.verdict(case, summary), quake_summary.statement(case, summary)
-    limit = task.slip_limit or 0.0
-    if slip > limit and verdict in (quake_summary.STANDS, NOT_AT_REST):
-        verdict = EXCEEDED
-    words = f"{words}; limit {1e3 * limit:.3g} mm"
+    exceeded = [kind for kind, limit in limits.listed if exceeds(row, verdict, kind, limit)]
+    if exceeded and verdict in (quake_summary.STANDS, NOT_AT_REST):
+        verdict = EXCEEDED[exceeded[0]]
+    values = [f"{1e3 * v:.3g} mm{'' if k == 'slip' else f' {k}'}" for k, v in limits.listed if v]
+    words = "; ".join([words, *([f"limit {', '.join(values)}"] if values else [])])
     fails = float(verdict != quake_summary.STANDS)
     return row | dict(zip(OUTCOME, (fails, verdict, words), strict=True))
+
+
+def exceeds(row: Mapping[str, Value], verdict: str, kind: str, limit: float) -> bool | None:
+    """Whether a row of an earthquake exceeds a limit of `Limits`; None if that is not known.
+
+    A dam that is not at rest exceeds a slip by that at its end, or it is not known.
+    """
+    if verdict == quake_summary.NO_EQUILIBRIUM:
+        return True
+    if row["end_slip"] == "" or verdict == NO_FRICTION:
+        return None
+    at_rest = row["residual_slip"] != ""
+    if kind == "opening":
+        return float(row["peak_opening"]) > limit
+    slip = abs(float(row["residual_slip" if at_rest else "end_slip"]))
+    return True if kind == "slip" and slip > limit else False if at_rest else None
 
 
 def message_of(error: Exception) -> str:
@@ -182,10 +208,9 @@ def planned(case: Case, plan: Plan) -> Iterator[tuple[str, Values, Task]]:
     """Key, values and task of each row of a plan. Raises InputError."""
     for row, varied in cases_of(case, plan):
         search = partial(search_of, varied, plan.critical) if plan.critical else None
-        limit = plan.slip_limit
-        if limit is not None:
+        if plan.quake:
             quake.check(varied)
-        task = Task(varied, bool(plan.sampled), search, plan.critical_columns, limit)
+        task = Task(varied, bool(plan.sampled), search, plan.critical_columns, plan.quake)
         yield key_of(varied, plan), row, task
 
 
@@ -279,7 +304,7 @@ class PlannedRows:
         self.case, self.plan = case, plan
         #: key, values and task of each
         self.planned = list(planned(case, plan))
-        of_quake = QUAKE_COLUMNS if plan.slip_limit is not None else ()
+        of_quake = QUAKE_COLUMNS if plan.quake else ()
         #: columns of the results, of which some have numbers only
         self.results = [*history_columns(case), *of_quake, *OUTCOME, *plan.critical_columns]
         self.numeric = [*history_columns(case), "failed"]
@@ -303,7 +328,8 @@ class PlannedRows:
         """The entries of its record; of random values only the names."""
         plan, case = self.plan, self.case
         about = {"rows": len(self.planned), "vary": plan.varied, "sample": [*plan.sampled]}
-        about |= {"tie": plan.tied, "critical": plan.critical, "slip_limit": plan.slip_limit}
+        limits = plan.quake and plan.quake.listed
+        about |= {"tie": plan.tied, "critical": plan.critical, "limits": limits}
         return {"sweep": about, "parameters": case.values, "levels": case.levels}
 
     def missing(self, known: Container[str] = ()) -> dict[str, Task]:
@@ -374,7 +400,7 @@ def sweep(
         try:
             for key, result in track(computed, f"sweep {case.name}", missing):
                 if not study.added:  # of the rows before
-                    for ending in (CHART, *STATISTICS):
+                    for ending in (CHART, *STATISTICS, *FRAGILITY):
                         beside(out, ending).unlink(missing_ok=True)
                 cells = *values[key].values(), *(result[c] for c in rows.results)
                 study.add([key, *(in_file(cell) for cell in cells)])
@@ -404,7 +430,7 @@ def rows_table(plan: Plan, rows: list[Row], width: int | None = None) -> str:
     """Format the first rows of a sweep: what is varied, verdict, main results; width: of the
     terminal, None: all columns.
     """
-    results = RESULTS if plan.slip_limit is None else RESULTS_OF_QUAKES
+    results = RESULTS_OF_QUAKES if plan.quake else RESULTS
     shown_always = [*map(column_of, plan.names), *plan.critical_columns[:3]]
     names = [n for n in dict.fromkeys([*shown_always, *results]) if rows and n in rows[0]]
     cells = [[short(name, row[name]) for name in names] for row in rows[:PRINTED]]
