@@ -46,7 +46,7 @@ ZERO = {"Pa": 1.0, "Pa per m": 1e5, "N per m": 1e-1, "kg per m3": 1e-2}
 
 #: Corrections of a derivative, and the last one over the derivative beyond which a point of the
 #: joint is at a kink: about to open, to slip or to break [-].
-CORRECTIONS, KINK = 3, 1e-5
+CORRECTIONS, KINK = 6, 1e-5
 #: Correction over the derivative up to which there is no further one [-].
 EXACT = 1e-9
 
