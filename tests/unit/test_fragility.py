@@ -59,11 +59,12 @@ def test_the_interval_covers_the_median_of_rows_that_depend_on_their_record(scat
         ([0, 0, 0, 0], "no row exceeds it"),
         ([1, 1, 1, 1], "all rows exceed it"),
         ([0, 0, 1, 1], "no row up to 2 exceeds it, all do from 3 on: no dispersion"),
+        ([0, 0, 1, 1, 0], "no row below 3 exceeds it, all do beyond: no dispersion"),
         ([1, 0, 1, 0], "does not grow with the intensity"),
     ],
 )
 def test_without_a_curve_there_is_a_reason(exceeds, reason):
-    of = fit([1.0, 2.0, 3.0, 4.0], exceeds)
+    of = fit([1.0, 2.0, 3.0, 4.0, 3.0][: len(exceeds)], exceeds)
     assert reason in of.reason and of.row()["median"] == ""
 
 

@@ -57,6 +57,8 @@ class Fit:
         least, most = self.intensity[self.exceeds].min(), self.intensity[~self.exceeds].max()
         if least > most:
             return f"no row up to {most:.4g} exceeds it, all do from {least:.4g} on: no dispersion"
+        if least == most:  # also then the likelihood grows without end as the dispersion vanishes
+            return f"no row below {most:.4g} exceeds it, all do beyond: no dispersion"
         if self.slope <= 0:
             return "the share of the rows that exceed it does not grow with the intensity"
         return ""
@@ -160,8 +162,12 @@ class Fit:
         independent, of up to GROUPS groups of rows by their intensity.
         """
         order = np.argsort(self.intensity, kind="stable")
+        parts = np.array_split(order, min(GROUPS, max(len(order) // 3, 1)))
+        different = np.unique(self.intensity)
+        if len(different) <= GROUPS:
+            parts = [np.flatnonzero(self.intensity == value) for value in different]
         result = []
-        for part in np.array_split(order, min(GROUPS, max(len(order) // 3, 1))):
+        for part in parts:
             x = float(np.exp(np.log(self.intensity[part]).mean()))
             result.append((x, *sampling.probability(int(self.exceeds[part].sum()), 0, len(part))))
         return result
@@ -223,7 +229,7 @@ def report(curves: Sequence[Fit], out: Path, intensity: str) -> str:
             {
                 **{name: row[name] for name in ("limit", "rows", "exceed", "undecided")},
                 f"median [{unit}]": interval,
-                "dispersion": f"{curve.dispersion:.3g}" if low != "" else f"- {curve.reason}",
+                "dispersion": f"{curve.dispersion:.3g}" if low != "" else "-",
             }
         )
     records = curves[0].records
@@ -232,4 +238,6 @@ def report(curves: Sequence[Fit], out: Path, intensity: str) -> str:
         if records > 1
         else f"{sampling.CONFIDENCE:.0%} interval of independent rows: rows of one record are not"
     )
-    return f"Fragility, lognormal in {intensity} ({how})\n{tabulate(cells, 'keys')}"
+    table_of = tabulate(cells, "keys", disable_numparse=True)
+    reasons = [f"{curve.words}: {curve.reason}" for curve in curves if curve.reason]
+    return "\n".join([f"Fragility, lognormal in {intensity} ({how})", table_of, *reasons])

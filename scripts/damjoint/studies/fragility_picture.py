@@ -57,7 +57,7 @@ def figure_of(curves: Sequence[Fit], title: str, intensity: str) -> Figure:
     axes.set(xlabel=f"{NAMES[intensity]} [{unit}]", ylabel="probability to exceed the limit [-]")
     axes.set(ylim=(-0.03, 1.03), xlim=(x[0], x[-1]))
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, loc="best")
+    figure.legend(fontsize=8, loc="outside lower center", ncols=2)
     title = f"{title}: fragility, {len(curves[0].exceeds)} rows, {curves[0].records} records"
     figure.suptitle(textwrap.fill(title, 100), fontsize=11, parse_math=False)
     return figure

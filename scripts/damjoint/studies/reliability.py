@@ -469,7 +469,8 @@ class Reliability:
 
     def agrees(self, probability: float) -> bool:
         """Whether a probability is so near to the sampled one that chance may be the reason."""
-        half = max(self.high - self.sampled, self.sampled - self.low)
+        above = probability > self.sampled
+        half = self.high - self.sampled if above else self.sampled - self.low
         error = half / stats.norm.isf((1 - sampling.CONFIDENCE) / 2)
         return abs(probability - self.sampled) <= DISAGREES * error
 

@@ -437,7 +437,7 @@ def rows_table(plan: Plan, rows: list[Row], width: int | None = None) -> str:
     units = {column_of(n): unit_of(n) for n in plan.names}
     units |= {f"critical_{plan.critical}": unit_of(plan.critical)} if plan.critical else {}
     units |= {name: unit for name, (unit, _) in PRINTED_UNITS.items()}
-    heads = [f"{n}\n[{units[n]}]" if units.get(n, "-") != "-" else n for n in names]
+    heads = [f"{n}\n[{units[n]}]" if units.get(n, "-") not in ("-", "") else n for n in names]
     if not rows:
         return ""
     table = fitted(names, heads, cells, results[:0:-1], width)
