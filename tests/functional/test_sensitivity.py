@@ -8,7 +8,7 @@ import damjoint as dj
 import numpy as np
 import pytest
 from closed_forms import WATER
-from damjoint.solver.derivatives import Side, history_row
+from damjoint.solver.derivatives import Side
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.studies import sensitivity
 from damjoint.studies.critical import Search
@@ -64,7 +64,7 @@ def history(case):
     """The last row of history.csv of a run, with safety factors and the end of the crack."""
     stepper = LoadStepper(case)
     stepper.run()
-    return history_row(Side(stepper.model, stepper.state, stepper.history.at_rest))
+    return sensitivity.values_of(Side(stepper.model, stepper.state, stepper.history.at_rest))
 
 
 OF_LAWS = {

@@ -15,7 +15,7 @@ as at open points, a second correction follows; its size shows a kink.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -33,7 +33,6 @@ from ..joint.linear_system import Border, DenseSystem, Tangent
 from ..joint.problem import JointProblem
 from ..model.loads import LEVEL, Loading, Unknown
 from ..model.results import column_of, history_table
-from ..statics.gravity import factors_of_state
 from .controls import DisplacementControl, Prescribed
 from .history import History
 from .model import Begun, Model, StepResult
@@ -49,9 +48,6 @@ ZERO = {"Pa": 1.0, "Pa per m": 1e5, "N per m": 1e-1, "kg per m3": 1e-2}
 CORRECTIONS, KINK = 6, 1e-5
 #: Correction over the derivative up to which there is no further one [-].
 EXACT = 1e-9
-
-#: Safety factors whose derivatives are given, of a joint whose law limits its shear.
-FACTORS = "SSF", "OSF"
 
 #: Groups of parameters on which the mesh or the way to the solution depends.
 NOT_CONTINUOUS = "Mesh", "Solver", "Geometry"
@@ -85,25 +81,21 @@ class Derivative:
         """Of the level, where a displacement is prescribed [m over the unit]."""
         return self.of(self.low.state.loading.level, self.high.state.loading.level)
 
-    def row(self) -> dict[str, float]:
-        """Of the columns of history.csv."""
-        low, high = (history_row(side) for side in (self.low, self.high))
+    def row(self, values: Callable[[Side], dict[str, float]]) -> dict[str, float]:
+        """Of values by name, such as `history_row`."""
+        low, high = (values(side) for side in (self.low, self.high))
         return {name: self.of(low[name], high[name]) for name in low}
 
 
 def history_row(side: Side) -> dict[str, float]:
-    """The row of history.csv of a state, and of each joint the FACTORS and the end of its crack."""
+    """The row of history.csv of a state, and of each joint the end of its crack."""
     equilibrium = side.model.equilibrium
     history = History(equilibrium, at_rest=side.at_rest)
     history.add(StepResult(side.state, 0, 0.0), 0)
     rows = {name: np.array(values, float) for name, values in history.rows.items()}
     case = side.model.case
     row = {name: float(c[-1]) for name, c in history_table(case, rows).items()}
-    for k, joint in enumerate(case.joints):
-        of_joint = {n: row[column_of(n, k)] for n in ("N", "T", "M", "bonded_length")}
-        state = of_joint | {n: row[n] for n in ("time", "level")}
-        factors = factors_of_state(joint, state) if joint.law.limits_shear else {}
-        row |= {column_of(name, k): factors.get(name, math.nan) for name in FACTORS}
+    for k in range(len(case.joints)):
         row[column_of("crack_end", k)] = crack_end(equilibrium, side.state, k)
     return row
 

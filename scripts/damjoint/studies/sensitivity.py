@@ -14,11 +14,10 @@ from ..arrays import Value
 from ..input.case import Case
 from ..input.parameters import declared, parameter
 from ..input.resolve import varied
-from ..model.results import Results, with_all_joints
+from ..model.results import Results, column_of, with_all_joints
 from ..post.summary import aligned
 from ..post.tables import write_csv
 from ..solver.derivatives import (
-    FACTORS,
     NOT_CONTINUOUS,
     Differentiation,
     Side,
@@ -27,11 +26,15 @@ from ..solver.derivatives import (
 )
 from ..solver.load_stepper import LoadStepper
 from ..solver.path import Point
+from ..statics.gravity import factors_of_state
 from ..threads import limited_threads
 from ..units import with_slash
 
 #: The file of the derivatives of a run.
 FILE = "sensitivity.csv"
+
+#: Safety factors whose derivatives are given, of a joint whose law limits its shear.
+FACTORS = "SSF", "OSF"
 
 #: Columns of history.csv that follow the parameters continuously, not lengths that count points;
 #: end of the crack, safety factors.
@@ -162,12 +165,25 @@ def of_run(case: Case, names: Sequence[str]) -> list[Sensitivity]:
             value, *_ = half_difference(stepper.case, name)
             for last in ends:
                 derivative, level = states[last][name], updates[last].state.loading.level
-                row = derivative.row()
+                row = derivative.row(values_of)
                 given = {c: row[c] for c in columns if c in row and np.isfinite(row[c])}
                 rows.append(Sensitivity(name, value, float(level), given, derivative.kink))
         for name in others:
             rows += of_two_runs(stepper, name, columns)
     return rows
+
+
+def values_of(side: Side) -> dict[str, float]:
+    """The row of history.csv of a state, the end of each crack, and of joints whose law limits
+    their shear the FACTORS.
+    """
+    row = history_row(side)
+    for k, joint in enumerate(side.model.case.joints):
+        of_joint = {n: row[column_of(n, k)] for n in ("N", "T", "M", "bonded_length")}
+        state = of_joint | {n: row[n] for n in ("time", "level")}
+        factors = factors_of_state(joint, state) if joint.law.limits_shear else {}
+        row |= {column_of(name, k): factors.get(name, np.nan) for name in FACTORS}
+    return row
 
 
 def of_two_runs(stepper: LoadStepper, name: str, columns: Sequence[str]) -> list[Sensitivity]:
@@ -185,7 +201,7 @@ def of_two_runs(stepper: LoadStepper, name: str, columns: Sequence[str]) -> list
         run = LoadStepper(other)
         run.run()
         at_rest = run.history.at_rest
-        sides.append([history_row(Side(run.model, s, at_rest)) for s in run.history.saved])
+        sides.append([values_of(Side(run.model, s, at_rest)) for s in run.history.saved])
     return [
         Sensitivity(
             name,
