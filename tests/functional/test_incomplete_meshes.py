@@ -276,6 +276,11 @@ NOTED = {
         "fixed holds 5 m of the dam's own surface",
     ),
     "slit": (with_slit, LEVELS, "two nodes lie at "),
+    "crest at the toe": (
+        lambda mesh: with_elements(mesh, "crest", elements(mesh, "toe")),
+        LEVELS,
+        "crest lies at y = 4 m, the dam reaches 45 m",
+    ),
     "hole in fixed": (without("fixed", [3]), LEVELS, "fixed: has a gap"),
     "section": (
         lambda mesh: mesh,

@@ -200,6 +200,9 @@ def notes_on_geometry(case: Case, mesh: Mesh) -> Iterator[str]:
     if cavities := geometry.cavities:
         several = f"{len(cavities)} cavities, one" if len(cavities) > 1 else "a cavity"
         yield f"the mesh has {several} at {cavities[0]}"
+    crest, high = geometry.regions["crest"].points[0, 1], geometry.concrete[:, 1].max()
+    if UP in sides and crest < high - geometry.height / 2:
+        yield f"crest lies at y = {crest:.5g} m, the dam reaches {high:.5g} m: not its crest"
     if geometry.height < LOWEST:
         yield f"the dam is {geometry.height:g} m high; is the mesh in another unit?"
 
