@@ -99,7 +99,7 @@ DIMENSIONS = {
     "Pa per m": (-1, 1, 0),
     "m per Pa": (1, -1, 0),
     **dict.fromkeys(["N per m", "N/m"], (1, 1, 0)),
-    "N m/m": (2, 1, 0),
+    **dict.fromkeys(["N m per m", "N m/m"], (2, 1, 0)),
     "m per s2": (0, 0, 1),
     "kg per m3": (-1, 1, -1),
     "s": (0.5, 0, -0.5),
