@@ -219,7 +219,7 @@ def test_a_level_of_unstable_growth_has_no_derivative(monkeypatch):
     point = SimpleNamespace(state=SimpleNamespace(trace=trace), level=54.0)
     point.model = SimpleNamespace(case=case)
     end = SimpleNamespace(level=-2.6e9, kink=True)
-    along = SimpleNamespace(along=lambda updates: [end])
+    along = SimpleNamespace(along=lambda updates: [{"mu": end}])
     monkeypatch.setattr(sensitivity, "Differentiation", lambda model, name: along)
     with pytest.raises(dj.RunError, match="the critical level has no derivative"):
         sensitivity.of_point(point, ["mu"])

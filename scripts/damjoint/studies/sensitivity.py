@@ -68,7 +68,7 @@ PRINTED_OF_CHECKS = (
 
 #: Loads with which the bodies are condensed.
 OF_BODIES = (
-    *("ice_force", "force_x", "force_y", "anchor_force"),
+    *("ice_force", "force_x", "force_y", "anchor_force", "traction_x", "traction_y"),
     *("temperature_dam", "temperature_linear", "temperature_found"),
 )
 
