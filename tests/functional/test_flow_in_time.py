@@ -239,6 +239,19 @@ def test_a_dry_end_has_no_suction():
     assert runs[0].last["N"] == pytest.approx(runs[1].last["N"], rel=1e-12)
 
 
+def test_a_dry_end_gives_no_water_to_drains_below_it():
+    """Air enters at a dry toe, however its head is rounded: the drains empty the joint."""
+    size = {"dam_height": 6.71, "dam_base": 5.3, "dam_crest": 0.414, "aperture_min": 8.85e-5}
+    drains = {"drains": 1.0, "drain_effectiveness": 1.0, "pressure_min": -1e5}
+    for slope in (3.0, 3.36):
+        settings = size | drains | {"joint_slope": slope, "time_unit": 2400.0, "n_joint": 8.0}
+        run = LoadStepper(load("dam", {"uplift": "flow"} | settings, (6.8,), None, 2))
+        run.run()
+        (pressure,), joint = run.state.pressures, run.model.equilibrium.interface.joints[0]
+        beyond = pressure.nodes[(joint.xi > 0.25) & (joint.xi < 1)]
+        assert len(beyond) > 4 and (beyond < -1).all()
+
+
 def test_water_flows_in_time_in_a_lift_only():
     """Whatever the uplift of the first joint."""
     lifts = {"lift_heights": (15.0,), "uplift": ("none", "flow"), "n_joint": 8.0, "order": 1.0}

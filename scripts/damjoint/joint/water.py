@@ -18,7 +18,14 @@ from ..laws import Law
 from ..model.loads import Loading, heads_at_ends
 from ..model.network import Network, WaterPath, networks_of
 from .flow import NO_NODES, Flow, FlowDerivative, FlowSolution, JointFields
-from .flow_in_time import FlowInTime, StoredWater, TimeStep, WaterBalance, stored_at_rest
+from .flow_in_time import (
+    ROUNDING,
+    FlowInTime,
+    StoredWater,
+    TimeStep,
+    WaterBalance,
+    stored_at_rest,
+)
 from .interface import Interface, JointInterface
 from .joint_laws import JointVariables
 from .turbulence import slowed, turbulent_flow
@@ -484,7 +491,7 @@ class WaterSystem:
         flow, case, ends = self.flow, self.members[0].case, self.fields.ends
         elevation = self.unit_weight * self.fields.joint.surface.points[:, 1]
         heads, (known, dry) = at_ends.copy(), np.zeros((2, len(at_ends)), bool)
-        dry[ends] = at_ends[ends] <= elevation[ends]
+        dry[ends] = at_ends[ends] - elevation[ends] <= ROUNDING * np.abs(at_ends).max()
         heads[dry] = elevation[dry]
         heads[drains] = drained
         known[ends] = known[drains] = True
