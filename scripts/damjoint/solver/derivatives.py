@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -309,6 +309,20 @@ class Differentiation:
             results.append({n: p.end(state, at_rest) for n, p in self.parameters.items()})
         return results
 
+    def level_rise(self, updates: Sequence[Trace]) -> float:
+        """How much the level still rises with the displacement prescribed at the end of a path that
+        has been followed, over its mean rise on the path [-]: about 1 as long as all is elastic, 0
+        at a limit point; inf without a prescribed displacement.
+        """
+        first, last = updates[0].state, updates[-1]
+        if self.linear.border is None or not isinstance(last.control, DisplacementControl):
+            return math.inf
+        measure = partial(self.model.measure, last.control)
+        moved, risen = measure(last.state) - measure(first), last.state.loading.level
+        size = len(self.linear.border.row)
+        _, (rate,) = self.linear.solve(np.zeros((size, 1)), np.ones(1))
+        return float(rate * moved / risen) if risen else math.inf
+
     def step(self, state: State, update: Trace) -> None:
         """Solve for the rates of all parameters at the end of a step from a state."""
         end = update.state
@@ -319,7 +333,8 @@ class Differentiation:
         if control:
             given = Prescribed(control, self.model.equilibrium)
             border = Border(here.by_unknown(unknown), given.row, given.rate(end.loading), 0.0)
-        linear, under_way = Linearised(problem, here.by_jump(False), border), [*self.parameters]
+        self.linear = linear = Linearised(problem, here.by_jump(False), border)
+        under_way = [*self.parameters]
         for part in self.parameters.values():
             part.begin(end.time, len(end.jump), unknown)
         for number in range(CORRECTIONS if under_way else 0):
