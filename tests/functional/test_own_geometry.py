@@ -177,8 +177,9 @@ def test_a_mesh_of_the_wrong_dimension_is_refused(draw):
 
 
 @pytest.mark.parametrize("name", ["trap.geo", "trap.GEO", "trap.msh", "trap.txt", "trap.msh.gz"])
-def test_a_geo_file_is_not_run_without_run_geo(tmp_path, command, name):
+def test_a_geo_file_is_not_run_without_run_geo(tmp_path, command, monkeypatch, name):
     """Gmsh runs files of any unknown type."""
+    monkeypatch.delenv("DAMJOINT_RUN_GEO", raising=False)  # of a command before, in this process
     (tmp_path / name).write_text(f'SystemCall "touch {tmp_path}/run";\nPoint(1) = {{0, 0, 0}};\n')
     (tmp_path / "own.case").write_text(f'geometry = "{name}";\n')
     code, _, err = command("run", tmp_path / "own.case")

@@ -116,7 +116,7 @@ def test_three_joints_against_closed_form_samples():
     """Of each joint alone and of the dam, whose limit state has a kink: FORM has less than half."""
     lifts = {**SLIDES, "n_joint": 20, "lift_heights": (12.0, 25.0)}
     case = dj.case("dam", levels=[25, 30], **lifts)
-    result = dj.reliability(case, **OF_JOINTS, samples=150, jobs=1)
+    result = dj.reliability(case, **OF_JOINTS, samples=100, jobs=1)
     *mu, rho, level = drawn(100_000, *OF_JOINTS.values())
     fails = [slide_level(m, rho, y) < level for m, y in zip(mu, (0, 12, 25), strict=True)]
     counts = [int(f.sum()) for f in (*fails, np.any(fails, axis=0))]

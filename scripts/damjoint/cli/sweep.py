@@ -120,14 +120,17 @@ def call(arguments: argparse.Namespace) -> int:
     limits = None if arguments.quake is None else Limits.of(arguments.quake)
     if not limits and (arguments.record or arguments.both_signs):
         raise InputError("--record, --both-signs: need --quake")
-    case = load_case(arguments, arguments.case)
     motions: dict[str, list[Value]] = {}
     if arguments.record:
         motions[MOTION] = [str(file) for file in arguments.record]
     if arguments.both_signs and not any(v.startswith("record_scale=") for v in arguments.vary):
-        motions["record_scale"] = [case["record_scale"]]
+        motions["record_scale"] = [1.0]  # in place of that of the case
     plan = plan_of(arguments.vary, arguments.tie, sample, settings, arguments.critical, motions)
+    case = load_case(arguments, arguments.case)
     if arguments.both_signs:
+        if "record_scale" in motions:
+            scale = {"record_scale": [case["record_scale"]]}
+            plan = dataclasses.replace(plan, varied={**plan.varied, **scale})
         plan = in_both_signs(plan)
     plan = dataclasses.replace(plan, quake=limits)
     if case.accuracy:
