@@ -129,8 +129,8 @@ def call(arguments: argparse.Namespace) -> int:
     case = load_case(arguments, arguments.case)
     if arguments.both_signs:
         if "record_scale" in motions:
-            scale = {"record_scale": [case["record_scale"]]}
-            plan = dataclasses.replace(plan, varied={**plan.varied, **scale})
+            motions["record_scale"] = [case["record_scale"]]
+            plan = dataclasses.replace(plan, varied={**plan.varied, **motions})
         plan = in_both_signs(plan)
     plan = dataclasses.replace(plan, quake=limits)
     if case.accuracy:
