@@ -158,6 +158,20 @@ MUTATIONS = (
         having("time_unit"),
     ),
     Mutation(
+        "elastic aperture x 1.02",
+        "joint/water.py",
+        'opening = opening + self.case["aperture_elastic"]',
+        'opening = opening + 1.02 * self.case["aperture_elastic"]',
+        having("aperture_elastic"),
+    ),
+    Mutation(
+        "exponent 4/7 of turbulent flow: 1/2",
+        "joint/turbulence.py",
+        "EXPONENT = 4 / 7",
+        "EXPONENT = 1 / 2",
+        having("turbulent"),
+    ),
+    Mutation(
         "G_t x 1.1",
         "laws/bond.py",
         'self.progress_per_slip = self.cohesion / (2 * p["G_t"])',

@@ -17,9 +17,9 @@ Choice = TypeVar("Choice")
 Drawn: TypeAlias = dict[str, Any]
 
 #: Third number of the seed of the lift joints, of temperature, works on the joint, waterstop, law =
-#: endo and variants of loads, of joints that meet, of softening curves, and of flow in time, which
-#: are drawn apart.
-LIFT_DRAWS, WORKS_DRAWS, NETWORK_DRAWS, CURVE_DRAWS, TIME_DRAWS = 1, 3, 4, 5, 6
+#: endo and variants of loads, of joints that meet, of softening curves, of flow in time, and of
+#: films, which are drawn apart.
+LIFT_DRAWS, WORKS_DRAWS, NETWORK_DRAWS, CURVE_DRAWS, TIME_DRAWS, FILM_DRAWS = 1, 3, 4, 5, 6, 7
 #: Parameters that are drawn for each joint, but for the place of its drains.
 OF_JOINTS = (
     *("law", "K_N", "K_T", "sigma_max", "adhesion", "mu", "pena_rupture", "alpha", "pena_tang"),
@@ -125,6 +125,7 @@ def random_scene(seed: int, number: int) -> RandomScene:
     scene = network(rng) if rng.event(0.06) else scene
     settings = with_curve(scene.settings, RandomNumbers(seed, number, CURVE_DRAWS))
     settings = with_time(settings, RandomNumbers(seed, number, TIME_DRAWS))
+    settings = with_film(settings, RandomNumbers(seed, number, FILM_DRAWS))
     return replace(scene, settings=settings)
 
 
@@ -142,6 +143,19 @@ def with_time(settings: Drawn, rng: RandomNumbers) -> Drawn:
         "storage": rng.log_uniform(1e-13, 1e-10),
         "pressure_min": rng.choice(0, -1e5),
     }
+
+
+def with_film(settings: Drawn, rng: RandomNumbers) -> Drawn:
+    """Settings, in some with flow an aperture that closing stress narrows, and turbulence (2D; some
+    with a thin liquid, so that it matters).
+    """
+    narrows, fast = rng.event(0.3), rng.event(0.3)
+    if "flow" not in np.ravel(settings["uplift"]):
+        return settings
+    drawn = {"aperture_elastic": rng.log_uniform(1e-7, 1e-3)} if narrows else {}
+    if fast and "dim" not in settings:
+        drawn |= {"turbulent": 1, "visc": rng.log_uniform(1e-6, 1e-3)}
+    return settings | drawn
 
 
 def with_curve(settings: Drawn, rng: RandomNumbers) -> Drawn:

@@ -71,7 +71,8 @@ from .water_in_time import heads_in_time
 #: times OF_RESIDUAL (forces out of balance by a part of the loads move the faces by about the same
 #: part of their displacement; by 27 times of it at most, in a hundred scenes), and rounding. Of a
 #: step that converges as usual, with a residual below 1e-9, it is below 1e-6. So is the sum of
-#: forces and moments on a body, over that of their sizes.
+#: forces and moments on a body: the residual, over the sizes of the forces on the body that has the
+#: most, as it is one of the whole dam, and rounding, over those on the body itself.
 OF_RESIDUAL, ROUNDING = 200.0, 1e-10
 #: The waterline is raised, for the shape of the pressure only, by RAISE of a face's height until
 #: force and lever can be distinguished: m_0 m_2 - m_1^2 > DISTINCT m_1^2.
@@ -475,7 +476,7 @@ class Stiffness:
     ) -> Callable[[Array], tuple[Array, float]]:
         """Return the solution for forces, with degrees of freedom held; of a floating body for the
         forces less their resultant, at rest in as many degrees of freedom as it has rigid motions;
-        and the largest force out of balance over the sum of all.
+        and the largest force out of balance [N].
         """
         free = np.flatnonzero(~held)
         motions = self.rigid_motions(held)[free] if floating else np.zeros((len(free), 0))
@@ -491,8 +492,7 @@ class Stiffness:
             solution += factors.solve(right[moving] - matrix @ solution)
             found = np.zeros(len(held))
             found[free[moving]] = solution
-            balance = np.abs(resultant).max(initial=0)
-            return found, float(balance / max(np.abs(forces).sum(), 1e-300))
+            return found, float(np.abs(resultant).max(initial=0))
 
         return solve
 
@@ -807,10 +807,13 @@ def jumps_at(
         forces[upper] += joint.forces(dam.bodies[upper])
         forces[lower] -= joint.forces(dam.bodies[lower])
     found = {name: dam.solvers[name](force) for name, force in forces.items()}
-    room = OF_RESIDUAL * residual + ROUNDING
+    sizes = {name: float(np.abs(force).sum()) for name, force in forces.items()}
     for name, (_, imbalance) in found.items():
-        if name != "foundation" and imbalance > room:
-            yield f"{name} out of balance by {imbalance:.3g} of its forces at t = {loads.time:g}"
+        most = OF_RESIDUAL * residual * max(sizes.values()) + ROUNDING * sizes[name]
+        if name != "foundation" and imbalance > most:
+            part = imbalance / sizes[name]
+            yield f"{name} out of balance by {part:.3g} of its forces at t = {loads.time:g}"
+    room = OF_RESIDUAL * residual + ROUNDING
     error, scale = misfit(dam, joints, {name: u for name, (u, _) in found.items()})
     if error > room * scale:
         off = f"{error:.3g} m, {error / scale:.3g} of the largest"

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from functools import cache, cached_property
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import meshio
 import numpy as np
@@ -36,6 +36,9 @@ SAME_TIME = 1e-9
 CRACK_APERTURE, CRACK_MOST = 1 / 4.5e9, 100.0
 #: Digits of the elimination in a network: conductances of open and closed joints differ by 1e18.
 PRECISION = 60
+#: Reynolds number from which flow between smooth plates is turbulent, and the change of the drops
+#: of the head over the largest one up to which it is settled.
+TURBULENT, SETTLED = (96 / 0.316) ** (4 / 3), 1e-12
 #: Modes whose water flows, and those that water does not pass.
 FLOWING, CLOSED = ("flow", "cracked"), ("none", "waterstop")
 
@@ -112,9 +115,11 @@ class JointState:
         for sides in self.sides:
             u, _ = joint_rule(sides.shape, sides.order, self.values["quadrature"])
             at = functions(sides.shape, sides.order, u)
-            opening = np.maximum(self.rows["delta_n"][self.find(sides.places)] @ at.T, 0)
+            jump = self.rows["delta_n"][self.find(sides.places)] @ at.T
+            opening = np.maximum(jump, 0)
             if self.values["uplift"] == "flow":
-                found.append(1 + opening / self.values["aperture_min"])
+                wider = np.maximum(jump + self.values["aperture_elastic"], 0)
+                found.append(1 + wider / self.values["aperture_min"])
             elif self.values["uplift"] == "cracked":
                 crack = self.crack_opening(start, opening.size).reshape(opening.shape)
                 beyond = np.maximum(opening - crack, 0)
@@ -124,6 +129,16 @@ class JointState:
                 found.append(np.ones_like(opening))
             start += opening.size
         return found
+
+    def slowed(self, cube: Array, slopes: Array) -> Array:
+        """Return the flow between smooth plates over that of the cubic law, for the cubes of the
+        aperture (m, q) and slopes of the head (m,): beyond the Reynolds number at which both
+        friction factors are equal, 96/Re and 0.316/Re^(1/4), by the second one.
+        """
+        values = self.values
+        gradient = self.unit_weight * np.abs(slopes)[:, None]
+        number = values["rho_water"] * cube * gradient / (6 * values["visc"] ** 2)
+        return np.asarray(np.minimum(1.0, (TURBULENT / np.maximum(number, 1)) ** (3 / 7)))
 
     def crack_opening(self, start: int, number: int) -> Array:
         """Return the opening [m] beyond which integration points (start, ...) are cracked: what had
@@ -232,6 +247,17 @@ def pressure(joint: JointState, heads: Heads, least: float = 0.0) -> Callable[[A
 
 # -- flow
 # --------------------------------------------------------------------------------------------------
+
+
+class HasDrops(Protocol):
+    """A solution with the drops of the head along the elements (m,) [m]."""
+
+    @property
+    def drops(self) -> Array:
+        """The drops."""
+
+
+Solution = TypeVar("Solution", bound=HasDrops)
 
 
 @dataclass(frozen=True)
@@ -362,21 +388,51 @@ class Network:
         """
         return [joint.widening() for joint in self.joints]
 
-    def conductivities(self, uniform: bool) -> Iterator[tuple[Sides, IntArray, Array]]:
+    def conductivities(
+        self, uniform: bool, drops: Array | None = None
+    ) -> Iterator[tuple[Sides, IntArray, Array]]:
         """Yield elements, their nodes, and w^3 times weights at the points of the law (m, q), in a
-        unit that is that of all joints; uniform: w = 1.
+        unit that is that of all joints; uniform: w = 1; drops: of the head along the elements (m,)
+        [m], under which the flow is turbulent, w^3 less by `slowed`.
         """
-        by_aperture = any(joint.values["uplift"] == "flow" for joint in self.joints)
+        first = 0
         for joint, tables, widening in zip(self.joints, self.tables, self.widening, strict=True):
-            closed = joint.values["aperture_min"] if by_aperture else 1.0
+            closed = joint.values["aperture_min"] if self.by_aperture else 1.0
             for sides, table, factor in zip(joint.sides, tables, widening, strict=True):
                 _, w = joint_rule(sides.shape, sides.order, joint.values["quadrature"])
                 cube = np.ones_like(factor) if uniform else (closed * factor) ** 3
+                if drops is not None and joint.values["uplift"] == "flow":
+                    own = drops[first : first + len(table)]
+                    cube = cube * joint.slowed(cube, own / (2 * sides.measures))
+                first += len(table)
                 yield sides, table, cube * np.outer(sides.measures, w)
 
-    def operator(self, uniform: bool) -> Graph | Surface:
-        """Return the equations of the flow; uniform: of a uniform aperture."""
-        parts = list(self.conductivities(uniform))
+    @property
+    def turbulent(self) -> bool:
+        """Whether the water may be turbulent: in a joint with `flow`."""
+        return bool(self.first.values["turbulent"]) and self.by_aperture
+
+    @property
+    def by_aperture(self) -> bool:
+        """Whether the opening of a joint is the aperture of its water."""
+        return any(joint.values["uplift"] == "flow" for joint in self.joints)
+
+    def settled(self, solve: Callable[[Array | None], Solution]) -> Solution:
+        """Return the flow that leads to its own conductances: by substitution, each iterate at
+        least twice as close as the last; solve: the flow for the drops of the last one.
+        """
+        found = solve(None)
+        while self.turbulent:
+            before, found = found, solve(found.drops)
+            if np.abs(found.drops - before.drops).max() <= SETTLED * np.abs(found.drops).max():
+                break
+        return found
+
+    def operator(self, uniform: bool, drops: Array | None = None) -> Graph | Surface:
+        """Return the equations of the flow; uniform: of a uniform aperture; drops: see
+        `conductivities`.
+        """
+        parts = list(self.conductivities(uniform, drops))
         if self.first.values["dim"] == 2:
             by_length = [c.sum(axis=1) / (2 * s.measures) ** 2 for s, _, c in parts]
             pairs = np.concatenate([table for _, table, _ in parts])
@@ -472,8 +528,13 @@ class Network:
 
     def solve(self, uniform: bool, drains: dict[int, float] | None = None) -> Flow:
         """Solve the flow, with the heads [m] at drains by node."""
-        operator, (heads, exits) = self.operator(uniform), self.fixed()
-        heads |= drains or {}
+        if uniform:
+            return self._solve(self.operator(uniform), drains or {})
+        return self.settled(lambda drops: self._solve(self.operator(False, drops), drains or {}))
+
+    def _solve(self, operator: Graph | Surface, drains: dict[int, float]) -> Flow:
+        heads, exits = self.fixed()
+        heads |= drains
         while True:
             found = operator.solve(heads)
             most = ENTERS * np.abs(found.inflow).max()
@@ -554,7 +615,10 @@ class Network:
             lengths = 2 * sides.measures
             conductance = cube @ w / 2 / lengths
             first = sum(len(t) for tables in self.tables[:joint] for t in tables)
-            means = share * conductance * self.flow.drops[first : first + len(table)]
+            drops = self.flow.drops[first : first + len(table)]
+            if values["turbulent"]:
+                conductance = cube * state.slowed(cube, drops / lengths) @ w / 2 / lengths
+            means = share * conductance * drops
             order = np.argsort(state.distance(sides.corners.mean(axis=1)))
             leakage = float(means[order[-1]])
         else:

@@ -71,6 +71,17 @@ class Stored:
         return Stored(*((1 - share) * own + share * its for own, its in pairs))
 
 
+@dataclass(frozen=True)
+class Filled:
+    """The end of a step: pressure at the nodes (n,) [Pa], what is stored, and the drops of the head
+    along the elements (m,) [m].
+    """
+
+    pressure: Array
+    stored: Stored
+    drops: Array
+
+
 class NoSet(Exception):
     """No set of nodes with voids is the right one."""
 
@@ -112,20 +123,26 @@ class Slot:
 
     def step(self, begin: Stored, seconds: float) -> tuple[Array, Stored]:
         """Return the pressure at the nodes (n,) [Pa] at the end of a step, and what is stored."""
-        free, state = self.without_drains(begin, seconds, {})
+        end = self.without_drains(begin, seconds, {})
         drains, effect = self.network.drains()
         weight = self.network.first.unit_weight
         outlets = {n: weight * head for n, head in drains.items()}
-        total = free + self.elevation
+        total = end.pressure + self.elevation
         if not effect or not outlets or any(total[n] <= head for n, head in outlets.items()):
-            return free, state
-        drained, other = self.without_drains(begin, seconds, outlets)
-        return (1 - effect) * free + effect * drained, state.mixed(effect, other)
+            return end.pressure, end.stored
+        drained = self.without_drains(begin, seconds, outlets)
+        pressure = (1 - effect) * end.pressure + effect * drained.pressure
+        return pressure, end.stored.mixed(effect, drained.stored)
 
-    def without_drains(
-        self, begin: Stored, seconds: float, fixed: dict[int, float]
-    ) -> tuple[Array, Stored]:
-        """See `step`; fixed: heads times the weight of water [Pa] beside those of the ends."""
+    def without_drains(self, begin: Stored, seconds: float, fixed: dict[int, float]) -> Filled:
+        """Return the end of a step, see `step`; fixed: heads times the weight of water [Pa] beside
+        those of the ends.
+        """
+        return self.network.settled(lambda drops: self._filled(begin, seconds, fixed, drops))
+
+    def _filled(
+        self, begin: Stored, seconds: float, fixed: dict[int, float], drops: Array | None
+    ) -> Filled:
         network, elevation = self.network, self.elevation
         first = network.first
         number, lowest = len(elevation), float(first.values["pressure_min"])
@@ -135,7 +152,7 @@ class Slot:
             for n in nodes.tolist():
                 dry[n] = level <= network.nodes[n, 1]
                 known[n] = max(first.unit_weight * level, float(elevation[n]))
-        graph = network.operator(uniform=False)
+        graph = network.operator(False, drops)
         assert isinstance(graph, Graph)  # in the plane
         pairs = graph.pairs
         conductances = graph.conductances / (12 * first.values["visc"])
@@ -155,7 +172,7 @@ class Slot:
             lacking = lacking - np.bincount(pairs[:, 1], missing, number)
             heads = known | {int(n): lowest + float(elevation[n]) for n in np.flatnonzero(voids)}
             source = rest / seconds + lacking
-            total, out = solved(pairs, conductances, ground, source, heads)
+            total, out, falling = solved(pairs, conductances, ground, source, heads)
             pressure = total - elevation
             excess = volume + storage * pressure - begin.volume + seconds * (out - lacking)
             largest = np.abs(total).max()
@@ -168,7 +185,8 @@ class Slot:
                 void = np.where(voids | dry, np.maximum(excess, 0), 0)
                 inflow = np.where(is_known, np.where(dry, np.minimum(excess, 0), excess), 0)
                 stored = volume + storage * pressure - void
-                return pressure, Stored(stored, void, begin.inflow + inflow)
+                end = Stored(stored, void, begin.inflow + inflow)
+                return Filled(pressure, end, falling / first.unit_weight)
             voids, air = (voids | empties) & ~fills, drawn
         raise NoSet
 
@@ -179,9 +197,10 @@ def solved(
     ground: Array,
     source: Array,
     fixed: dict[int, float],
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
     """Return heads (n,) of the flow with what nodes store, ground (n,), and sources (n,), for fixed
-    heads by node; and what flows out of each node (n,). The others are eliminated one by one.
+    heads by node; what flows out of each node (n,); the drops along the pairs (m,). The others are
+    eliminated one by one.
     """
     number = len(ground)
     with localcontext() as context:
@@ -212,7 +231,8 @@ def solved(
             float(sum((size * (heads[n] - heads[b]) for b, size in own.items()), Decimal(0)))
             for n, own in enumerate(original)
         ]
-        return np.array([float(heads[n]) for n in range(number)]), np.array(out)
+        drops = [float(heads[i] - heads[k]) for i, k in pairs.tolist()]
+    return np.array([float(heads[n]) for n in range(number)]), np.array(out), np.array(drops)
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,13 @@ SCENES = {
     "flood": "run dam --set law=friction --set adhesion=0 --set mu=1.5 --set dam_base=28 --set "
     "order=1 --set uplift=flow --set time_unit=3 --set storage=1e-11 --set pressure_min=-1e5 --set "
     "drains=1 --set drain_x=7 --levels 30,44,40 --tail-levels 0,5,2 --steps 3",
+    "turbulent film": "run dam --set law=friction --set adhesion=0 --set mu=1.5 --set dam_base=28 "
+    "--set order=1 --set lift_heights=20 --set uplift=flow,cracked --set turbulent=1 "
+    "--set visc=1e-5 --set aperture_elastic=2e-4 --set drains=1 --set drain_x=7 --levels 30,44 "
+    "--tail-levels 5",
+    "turbulent flood": "run dam --set law=friction --set adhesion=0 --set mu=1.5 --set dam_base=28 "
+    "--set order=1 --set uplift=flow --set turbulent=1 --set visc=1e-5 --set aperture_elastic=2e-4 "
+    "--set time_unit=3 --set storage=1e-11 --set drains=1 --set drain_x=7 --levels 44 --steps 2",
     "flood of blocks": "run monoliths --run-geo --set uplift=flow --set time_unit=60 --set "
     "storage=1e-12 --levels 30,44,20 --steps 2",
 }
@@ -83,6 +90,18 @@ def test_water_that_is_stored_is_replayed(written):
         other = tuple(changed if word.startswith(f"{name}=") else word for word in words)
         assert other != words
         assert "p of the flow in time off" in "".join(found(water_in_time, folder, other)), name
+
+
+@pytest.mark.parametrize("name", ["turbulent film", "turbulent flood"])
+def test_films_are_told_apart(written, name):
+    """The cubic law, another viscosity and another aperture of the unstressed joint show."""
+    folder, words = written(name)
+    check = water if name == "turbulent film" else water_in_time
+    for changed in ("turbulent=0", "visc=1.1e-5", "aperture_elastic=2.1e-4"):
+        parameter = changed.split("=")[0]
+        other = tuple(changed if word.startswith(f"{parameter}=") else word for word in words)
+        assert other != words
+        assert "joint 1: " in "".join(found(check, folder, other)), changed
 
 
 @pytest.mark.heavy

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
 from .. import ROUND_OFF
-from ..arrays import Array, IntArray
+from ..arrays import Array, BoolArray, IntArray
 from ..csr import CsrMatrix
 from ..input.case import Case
 from ..input.values import flows, freezes_uplift, has_drains
@@ -433,10 +433,11 @@ class WaterSystem:
             at_ends = weight * ends
 
         def solved(nodes: IntArray, outlet: Array) -> FlowSolution:
-            if not self.members[0].case["turbulent"]:
+            if not self.turbulent.any():
                 return by_conductivity(conductivity, nodes, outlet)
             per_gradient = 2 * self.reference * conductivity / self.flow.points.weights
             per_gradient *= self.members[0].case["rho_water"] / self.members[0].case["visc"]
+            per_gradient *= self.turbulent
             solution, last = turbulent_flow(
                 lambda share: by_conductivity(share * conductivity, nodes, outlet),
                 (self.reference if step else 1) * conductivity,
@@ -507,6 +508,14 @@ class WaterSystem:
         solution = balance.solve(self.reference * conductivity, imposed, heads, known, dry)
         self.last_voids[len(drains)] = solution.void
         return solution
+
+    @cached_property
+    def turbulent(self) -> BoolArray:
+        """Whether the flow at the Gauss points (q,) may be turbulent: in a joint with `flow`, whose
+        aperture is its opening.
+        """
+        may = [w.case["turbulent"] and w.case["uplift"] == "flow" for w in self.members]
+        return np.repeat(np.array(may, bool), [len(w.joint.points.weights) for w in self.members])
 
     @property
     def reference(self) -> float:
