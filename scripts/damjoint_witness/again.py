@@ -55,10 +55,12 @@ def follows_history(asked: Asked, first_step: bool = True) -> bool:
 def follows_steps(asked: Asked, *records: dict[str, Any]) -> bool:
     """Return whether a state may depend on the load steps: on the history; after levels that fall;
     of water that enters a crack after the step that has opened it; after unstable crack growth; of
-    slip whose direction in a 3D joint turns, which a step takes as constant.
+    a weight that has not converged alone; of slip whose direction in a 3D joint turns, which a step
+    takes as constant.
     """
     falls = any(list(levels) != sorted(levels) for levels in (asked.levels, asked.tail_levels))
-    unstable = any(record.get(n) for record in records for n in ("unstable_growth", "limit_points"))
+    names = "unstable_growth", "limit_points", "weight_with_water"
+    unstable = any(record.get(name) for record in records for name in names)
     entering = any(v["uplift"] == "cracked" for v in asked.joints)
     turns = asked.joints[0]["dim"] == 3 and any(v["law"] != "rupture" for v in asked.joints)
     return follows_history(asked) or falls or unstable or entering or turns

@@ -65,6 +65,8 @@ class LoadStepper:
         self.path_ended = False
         #: how the dam fails, once its equilibrium path has shown that it does
         self.mechanism: Mechanism | None = None
+        #: whether the weight alone, which is to act first, has not converged
+        self.weight_with_water = False
         #: levels of the limit points that have been passed, and the lowest ones behind them [m]
         self.limit_points: tuple[tuple[float, float], ...] = ()
         #: the levels at which a crack grew unstably, to a state that depends on the steps
@@ -137,6 +139,7 @@ class LoadStepper:
         The state has no row in the history.
         """
         step = self.model.advance(self.state, 0.0, self.control(0.0))
+        self.weight_with_water = step is None and bool(self.case["weight_first"])
         if step is None:
             return False
         self.state = step.state
@@ -417,6 +420,7 @@ class LoadStepper:
                 self.mechanism = replace(self.mechanism, level=highest)
         info = {
             "mechanism": self.mechanism and asdict(self.mechanism),
+            "weight_with_water": self.weight_with_water,
             "limit_points": self.limit_points,
             "unstable_growth": self.relaxed_at,
             "end_of_solution": self.end_of_solution,

@@ -85,6 +85,11 @@ def hints_on_run(results: Results) -> list[str]:
             f"the foundation reaches {reach:g} m: less than {LEAST_FOUNDATION:g} heights of the "
             "dam make the crack too long"
         )
+    if results.info.get("weight_with_water") and last:
+        messages.append(
+            "the weight alone has not converged: it acts with the first level, and the state may "
+            "depend on the load steps"
+        )
     if levels := results.info.get("unstable_growth"):
         messages.append(
             f"unstable crack growth at level {min(levels):.4g} m: the state after it depends on "

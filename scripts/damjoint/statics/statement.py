@@ -11,15 +11,25 @@ from ..input.values import has_drains, level_unknown
 from ..model.results import Results
 from ..units import FORCES, STRESSES, with_unit
 from . import gravity
-from .verdict import STIFF_JOINT, Bound, bound, failure, slipped_from, stiffness_ratio, verdict
+from .verdict import (
+    REASONS,
+    STIFF_JOINT,
+    Bound,
+    bound,
+    failure,
+    impossible_at_first,
+    slipped_from,
+    stiffness_ratio,
+    verdict,
+)
 
 
 def statement(results: Results) -> str:
     """Why and where a run has stopped, or that the dam slides; empty if it stands."""
     case, last, why = results.case, results.last, failure(results)
     mode, joint = why.mode, why.at(case)
-    if mode == "no equilibrium":
-        return "no equilibrium even at the first step"
+    if not last:
+        return reason_at_first(results)
     if results.stopped:
         where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
         if mode == "out of range":
@@ -40,6 +50,18 @@ def statement(results: Results) -> str:
     return (
         f"{slides}; the dam stands on the hardening {hardening} = {case[hardening]:.4g} Pa/m"
         f"{'' if case.hardening_requested else default}"
+    )
+
+
+def reason_at_first(results: Results) -> str:
+    """Why a run has no step at all: by statics, or because none has converged."""
+    mode, level, _ = impossible_at_first(results.case)
+    if mode:
+        return f"{verdict(results)}: no equilibrium at level {level:.6g} m: {REASONS[mode]}"
+    end = results.info.get("end_of_solution")
+    return (
+        "not converged: no equilibrium is found at the first step, and none is excluded by statics"
+        + (f"; {end}" if end else "")
     )
 
 

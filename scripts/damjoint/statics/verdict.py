@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -49,11 +50,11 @@ class Bound:
 
 
 def verdict(results: Results) -> str:
-    """One of: stands, sliding, overturning, broken through, out of range, not converged, no
-    equilibrium, interrupted; a failure with its joint if there are several: "sliding on base".
+    """One of: stands, sliding, overturning, broken through, out of range, not converged,
+    interrupted; a failure with its joint if there are several: "sliding on base".
 
-    "no equilibrium": not even at the first step. "sliding" also where the whole joint has slipped
-    or opened and only the hardening of the joint resists.
+    "sliding" also where the whole joint has slipped or opened and only the hardening of the joint
+    resists.
     """
     why = failure(results)
     joint = why.at(results.case)
@@ -63,7 +64,8 @@ def verdict(results: Results) -> str:
 def failure(results: Results) -> Failure:
     """How the dam fails; a mode without joints if it is not known where."""
     if not results.last:
-        return Failure("no equilibrium")
+        mode, _, joint = impossible_at_first(results.case)
+        return Failure(mode or "not converged", joint)
     if results.stopped:
         return why_stopped(results)
     slipped = slipped_joints(results)
@@ -261,41 +263,73 @@ REASONS = {
 }
 
 
+def has_bounds(case: Case) -> bool:
+    """Whether statics bounds the resultants on a case's only joint: they follow from the loads, and
+    from the length of the crack.
+    """
+    return not (case.geometry or case["uplift"] == "flow" or freezes_uplift(case))
+
+
+def reserves(case: Case, state: gravity.GravityMethod) -> dict[str, float]:
+    """The least moment [N m/m] and the largest shear [N/m] of a case's only joint, beyond those of
+    a state, by how the dam fails where one is negative.
+
+    Whatever the distribution of stress: with the tensile strength f over the length l that is not
+    cracked, M >= -f l^2/2, and the shear is at most the law's `shear_bound`.
+    """
+    law, length = case.law, state.uncracked
+    return {
+        "overturning": state.M + law.tensile_strength * length**2 / 2,
+        "sliding": float(law.shear_bound(np.array(state.N), length)) - state.T,
+    }
+
+
 def highest_on_joint(case: Case, last: dict[str, float]) -> tuple[float, str]:
     """The level [m] above which no equilibrium of a case's only joint exists, and how the dam fails
     there, see `highest_by_statics`.
 
-    Whatever the distribution of stress: with the tensile strength f over the length l that is not
-    cracked, M >= -f l^2/2, and the shear is at most the law's `shear_bound`; the crack does not
-    close as the level rises. A law whose open points transmit tension has l = the whole joint.
+    By its `reserves`; the crack does not close as the level rises. A law whose open points transmit
+    tension has l = the whole joint.
     """
     from scipy.optimize import brentq  # half of a run's start
 
-    law, time = case.law, min(last["time"], case.times[-1])
-    if case.geometry or case["uplift"] == "flow" or freezes_uplift(case):
+    if not has_bounds(case):
         return np.inf, ""
-    crack = 0.0 if law.open_tension else last["crack_length"]
+    time = min(last["time"], case.times[-1])
+    crack = 0.0 if case.law.open_tension else last["crack_length"]
 
     def block(level: float) -> gravity.GravityMethod:
         return gravity.with_crack(case, time, level, crack)
 
-    at_last = block(last["level"])
-    length = at_last.uncracked
-
-    def moment(level: float) -> float:
-        return block(level).M + law.tensile_strength * length**2 / 2
-
-    def shear(level: float) -> float:
-        state = block(level)
-        return float(law.shear_bound(np.array(state.N), length)) - state.T
+    def reserve(mode: str, level: float) -> float:
+        return reserves(case, block(level))[mode]
 
     bounds = [(np.inf, "")]
+    at_last = block(last["level"])
     if abs(at_last.M - last["M"]) < SAME_CRACK * abs(at_last.N) * case.joint_along:
-        for reserve, mode in ((moment, "overturning"), (shear, "sliding")):
-            if reserve(last["level"]) > 0 > reserve(case.highest_level):
-                root = brentq(reserve, last["level"], case.highest_level)
-                bounds.append((root, mode))
+        now, most = (reserves(case, state) for state in (at_last, block(case.highest_level)))
+        bounds += [
+            (brentq(partial(reserve, mode), last["level"], case.highest_level), mode)
+            for mode in now
+            if now[mode] > 0 > most[mode]
+        ]
     return min(bounds)
+
+
+def impossible_at_first(case: Case) -> tuple[str, float, tuple[int, ...]]:
+    """How the dam fails at the first time of a case, by the `reserves` of its joints without a
+    crack, the level there [m], and the joint; an empty mode if statics does not show that it fails.
+    """
+    time = case.times[0]
+    level = case.level_at(time)
+    if case["drive"] == "level":
+        for k, joint in enumerate(case.joints):
+            if has_bounds(joint) and case.separates((k,)):
+                block = gravity.with_crack(joint, time, level, 0.0)
+                for mode, reserve in reserves(joint, block).items():
+                    if reserve < 0:
+                        return mode, level, (k,)
+    return "", level, ()
 
 
 def mean_along(s: Array, values: Array) -> float:
