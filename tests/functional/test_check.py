@@ -620,6 +620,21 @@ def test_the_table_fits_the_terminal_with_named_columns(solve, width):
     assert (" U " in table.splitlines()[0]) == (width == 120)
 
 
+def test_long_names_of_combinations_are_wrapped_over_the_rows_of_each(solve):
+    names = "normal operation with drains in service", "flood of the design with drains clogged"
+    checks = []
+    for name in names:
+        (result,) = solve("dam", (30.0,), n_joint=10.0, order=1.0, required_SSF=1.5)
+        result = replace(result, case=replace(result.case, name=name))
+        checks += compare_joints(result)
+    table = text_table(checks, 80).split("\n\n")[1].splitlines()
+    assert max(map(len, table)) <= 80
+    rows = table[3:7]
+    assert [row[:25].strip() for row in rows][2:] == ["", ""]
+    assert " ".join(row[:35].split("  ")[0] for row in rows).strip() == names[0]
+    assert "FE" in rows[0] and "gravity" in rows[1] and "required" in rows[3]
+
+
 def test_a_joint_that_others_hold_may_slip_along_its_full_length(tmp_path):
     """Its SSF is 1 less the hardening; the run stands, and so does the check."""
     blocks = {"one": (0.0, 0.0, 10.0, 20.0), "two": (10.0, 0.0, 22.0, 20.0)}

@@ -148,15 +148,25 @@ def test_the_geometry_by_two_runs():
 def test_the_factors_of_a_check(command, tmp_path):
     words = "check", "dam", "--set", "n_joint=10", "--levels", "30", "--out", "out"
     code, out, _ = command(*words, "--sensitivity", "mu,dam_base")
-    assert (
-        code == 0 and "dam, uplift imposed: Change by one percent" in out and "of two runs" in out
-    )
+    assert code == 0 and "dam, uplift imposed:\nChange by one percent" in out
+    assert "\nof two runs: dam_base\n" in out
     table = {r["parameter"]: r for r in rows_of(tmp_path / "out/dam/sensitivity.csv")}
     row = next(r for r in rows_of(tmp_path / "out/check.csv") if "gravity" in r["answer"])
     expected = float(row["N"]) / float(row["T"])
     assert float(table["mu"]["SSF"]) == pytest.approx(expected, rel=1e-6)
     assert command(*words, "--sensitivity", "mu,dam_base")[1] == out  # from the files
     assert "Change by" not in command(*words)[1]
+
+
+def test_the_printed_table_fits_the_terminal():
+    heads = "SSF [-]", "OSF [-]", "crest_ux [mm]", "max_opening [µm]", "N [MN/m]", "T [MN/m]"
+    of = {"unit": "Pa/m", "value": 1.2345e11} | dict.fromkeys(heads, -1.2345e-5)
+    listed = [{"parameter": f"lift {k} m.adhesion", **of, "note": "at a kink"} for k in (12, 25)]
+    narrow, wide = sensitivity.text(listed, 80), sensitivity.text(listed)
+    assert max(map(len, narrow.splitlines())) <= 80 < max(map(len, wide.splitlines()))
+    assert "SSF" in narrow and "(--wide shows also: T, N" in narrow
+    for printed in (narrow, wide):
+        assert printed.endswith("at a kink: lift 12 m.adhesion, lift 25 m.adhesion")
 
 
 def rows_of(path):

@@ -46,7 +46,7 @@ def call(arguments: argparse.Namespace) -> int:
     cases, out = load_cases(arguments, arguments.cases), arguments.out
     checks = check_cases(cases, out, arguments.jobs, arguments.sensitivity or "")
     errors = [f"{check.case.name}: {check.accuracy}" for check in checks if check.accuracy]
-    derived = changes_of(cases, out) if arguments.sensitivity else []
+    derived = changes_of(cases, out, table_width(arguments)) if arguments.sensitivity else []
     say(
         "\n\n".join(
             [text_table(checks, table_width(arguments)), *errors, *derived, str(out / "check.csv")]
@@ -55,8 +55,10 @@ def call(arguments: argparse.Namespace) -> int:
     return int(any(result.verdict in ("fail", NOT_JUDGED) for c in checks for result in c.results))
 
 
-def changes_of(cases: Sequence[Case], out: Path) -> list[str]:
-    """What the parameters change in each scene of cases, by its record below out."""
+def changes_of(cases: Sequence[Case], out: Path, width: int | None) -> list[str]:
+    """What the parameters change in each scene of cases, by its record below out; width: of the
+    terminal, None: all columns.
+    """
     from ..post import folder as folders
     from ..studies import sensitivity
 
@@ -65,6 +67,6 @@ def changes_of(cases: Sequence[Case], out: Path) -> list[str]:
         case = next(case for case in cases if case.name == scene.name)
         info = folders.read_info(folders.scene_folder(case, scene, out / case.name)) or {}
         if derived := info.get("sensitivity"):
-            words = derived["statement"] or sensitivity.text(derived["changes"])
-            texts.append(f"{scene.name}, uplift {scene['uplift']}: {words}")
+            words = derived["statement"] or sensitivity.text(derived["changes"], width)
+            texts.append(f"{scene.name}, uplift {scene['uplift']}:\n{words}")
     return texts

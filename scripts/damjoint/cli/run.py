@@ -78,7 +78,11 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
         if result.last:
             say(f"\n{summary.text(result, table_width(arguments))}")
         if derived := result.info.get("sensitivity"):
-            say("", derived["statement"] or sensitivity.text(derived["changes"]))
+            say(
+                "",
+                derived["statement"]
+                or sensitivity.text(derived["changes"], table_width(arguments)),
+            )
         lines = [*hints(result), result.info.get("error_estimate", {}).get("statement", "")]
         if any(lines):
             say("", *filter(None, lines))

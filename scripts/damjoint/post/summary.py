@@ -234,8 +234,8 @@ GAP = 2
 
 def aligned(rows: list[tuple[str, ...]], heads: list[str], left: int = 0, right: int = 0) -> str:
     """Align rows of cells below headings of several lines; the first `left` columns, the last one
-    and `right` before it to the left, the others to the right. (A package for this takes longer to
-    load than the run to compute.)
+    and `right` before it to the left (right = -1: not the last either), the others to the right.
+    (A package for this takes longer to load than the run to compute.)
     """
     lines = list(zip_longest(*(head.split("\n") for head in heads), fillvalue=""))
     widths = [

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from functools import partial
+from itertools import groupby
+from textwrap import wrap
 
 import numpy as np
 
@@ -13,6 +15,9 @@ from ..units import FORCES, MOMENTS, STRESSES, Units, unit
 from .check import (
     DIFFERENCE,
     FAIL,
+    FINITE_ELEMENTS,
+    GRAVITY,
+    LONGER,
     Row,
     SafetyCheck,
     common_notes,
@@ -40,6 +45,9 @@ SHOWN: tuple[tuple[Units, dict[str, str]], ...] = (
 
 #: Columns that a narrow table leaves out, in this order.
 LESS = ("level", "c L", "c B", "eff. toe", "eff. heel", "M", "N' at x", "U", "crack", "T", "N'")
+
+#: Methods in a table that is too wide with their full names.
+SHORT = {FINITE_ELEMENTS: "FE", GRAVITY: "gravity", LONGER: "longer crack"}
 
 
 def text_table(checks: list[SafetyCheck], width: int | None = None) -> str:
@@ -69,9 +77,18 @@ def text_table(checks: list[SafetyCheck], width: int | None = None) -> str:
     of_case = common if first != "case" else ""
     columns = [[scene.removeprefix(of_case) for scene in scenes], methods, *columns, *verdicts]
     heads = [first, "method", *heads, "N' in", "check"]
-    cells = list(zip(*columns, strict=True))
     draw = partial(aligned, left=2, right=1)
-    table = fitted([*names, "N' in", "check"], heads, cells, LESS, width, draw)
+
+    def drawn() -> str:
+        cells = list(zip(*columns, strict=True))
+        return fitted([*names, "N' in", "check"], heads, cells, LESS, width, draw)
+
+    table = drawn()
+    if width is not None and (excess := max(map(len, table.splitlines())) - width) > 0:
+        columns[1] = [SHORT.get(method, method) for method in methods]
+        excess -= max(map(len, methods)) - max(map(len, columns[1]))
+        columns[0] = in_rows(columns[0], max(map(len, columns[0])) - max(excess, 0))
+        table = drawn()
     lines = [
         f"{scene}, {row['answer']}: {'fails, ' * (row['verdict'] == FAIL)}{row['why']}"
         for scene, row in zip(scenes, rows, strict=True)
@@ -83,6 +100,15 @@ def text_table(checks: list[SafetyCheck], width: int | None = None) -> str:
     ]
     parts = "\n".join([*verdict_lines, *lines]), table, "\n".join(labelled_notes(checks))
     return "\n\n".join(filter(None, parts))
+
+
+def in_rows(names: list[str], width: int) -> list[str]:
+    """Each of the names once, wrapped over the rows that follow each other with it."""
+    cells = list[str]()
+    for name, same in groupby(names):
+        rows = len(list(same))
+        cells += [*wrap(name, max(width, 1), max_lines=rows), *[""] * rows][:rows]
+    return cells
 
 
 def labelled_notes(checks: list[SafetyCheck]) -> list[str]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from textwrap import wrap
 
 import numpy as np
 
@@ -15,7 +17,7 @@ from ..input.case import Case
 from ..input.parameters import declared, parameter
 from ..input.resolve import varied
 from ..model.results import Results, column_of, with_all_joints
-from ..post.summary import aligned
+from ..post.summary import aligned, fitted
 from ..post.tables import write_csv
 from ..solver.derivatives import (
     NOT_CONTINUOUS,
@@ -322,12 +324,22 @@ def changes(
     return listed
 
 
-def text(listed: Sequence[Mapping[str, Value]]) -> str:
-    """Changes as a printed table."""
+def text(listed: Sequence[Mapping[str, Value]], width: int | None = None) -> str:
+    """Changes as a printed table; width: of the terminal, None: all columns."""
+    names = [name for name in listed[0] if name != "note"]
     rows = [
-        tuple(f"{v:.4g}" if isinstance(v, float) else str(v) for v in row.values())
+        tuple(
+            f"{v:.{4 if n == 'value' else 3}g}" if isinstance(v := row[n], float) else str(v)
+            for n in names
+        )
         for row in listed
     ]
     title = "Change by one percent more of a parameter (by its unit, if it is 0)"
-    heads = [name.replace(" [", "\n[").replace("at a ", "at a\n") for name in listed[0]]
-    return f"{title}\n{aligned(rows, heads, left=2)}"
+    heads = [name.replace(" [", "\n[") for name in names]
+    shown = [name.partition(" [")[0] for name in names]
+    table = fitted(shown, heads, rows, shown[:3:-1], width, partial(aligned, left=2, right=-1))
+    lines = [title, table]
+    for note in dict.fromkeys(row["note"] for row in listed if row["note"]):
+        of = ", ".join(str(row["parameter"]) for row in listed if row["note"] == note)
+        lines += wrap(f"{note}: {of}", width or 10_000)
+    return "\n".join(lines)
