@@ -65,10 +65,10 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
         options["further"] = partial(sensitivity.write, names, picture)
     options |= {"engine": arguments.engine, "drawing": drawing}
     for result in run(case, out, fields, picture, **options):
-        history = result.history
+        steps, iterations = len(result.history["time"]), int(result.history["iterations"].sum())
         say(
-            f"{case.name}, uplift {result.case['uplift']}: {verdict(result)}; "
-            f"{len(history['time'])} steps, {history['iterations'].sum():.0f} iterations; {out}"
+            f"{case.name}, uplift {result.case['uplift']}: {verdict(result)}; {steps} "
+            f"step{'s' * (steps != 1)}, {iterations} iteration{'s' * (iterations != 1)}; {out}"
         )
         driven = case["drive"] != "level"
         if reasons := [
