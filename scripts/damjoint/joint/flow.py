@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -173,6 +173,17 @@ class Coupling:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Pieces:
+    """2D: lines of elements and their nodes, cut where the heads are known."""
+
+    pieces: list[tuple[IntArray, IntArray]]
+    #: first and last node of each (pieces, 2)
+    ends: IntArray
+    #: whether the head of one of these is not known: a branching or a closed end
+    join: bool
+
+
+@dataclass(frozen=True, kw_only=True)
 class FlowDerivative:
     """Derivative of the pressure with the unknowns (p, columns), without its zero columns."""
 
@@ -261,6 +272,8 @@ class Flow:
             #: 2D: lines of elements and of their nodes, from heel to toe or between branchings
             self.lines = self._branches() if fields.branched else [self._from_heel_to_toe()]
             self.lengths = np.bincount(points.elements, points.weights)
+            #: the lines cut at nodes of known heads, by the bytes of their mask: of the last ones
+            self.cut_lines = lru_cache(maxsize=8)(self._cut_lines)
         #: unit vectors along the lines or towards the toe at the Gauss points
         self.towards = self._along_lines() if fields.branched else self._towards_toe()
         if fields.dim == 3:
@@ -355,12 +368,16 @@ class Flow:
 
     def pieces(self, known: BoolArray) -> list[tuple[IntArray, IntArray]]:
         """2D: elements and nodes of the lines, cut where the heads are known."""
-        pieces = []
+        return self.cut_lines(known.tobytes()).pieces
+
+    def _cut_lines(self, mask: bytes) -> Pieces:
+        known, pieces = np.frombuffer(mask, bool), []
         for cells, nodes in self.lines:
             cuts = np.flatnonzero(known[nodes])
             cuts = np.unique([0, *cuts, len(cells)])
             pieces += [(cells[i:k], nodes[i : k + 1]) for i, k in itertools.pairwise(cuts)]
-        return pieces
+        ends = np.array([nodes[[0, -1]] for _, nodes in pieces])
+        return Pieces(pieces=pieces, ends=ends, join=not known[ends].all())
 
     def _in_lines(
         self, conductivity: Array, imposed: Array, heads: Array, known: BoolArray
@@ -371,19 +388,26 @@ class Flow:
         No differences of nearly equal numbers, however large the ratio of the conductivities (a
         factorised matrix loses the closed joint beside the open one).
         """
-        resistance, pieces = self.resistances(conductivity), self.pieces(known)
-        ends = np.array([nodes[[0, -1]] for _, nodes in pieces])
-        wholes = np.array([np.cumsum(resistance[cells])[-1] for cells, _ in pieces])
-        heads, differences = junction_heads(heads, known, ends, 1 / wholes)
-        total, drops, parts = heads.copy(), np.zeros(len(resistance)), []
-        for (cells, nodes), whole, difference in zip(pieces, wholes, differences, strict=True):
+        resistance, cut = self.resistances(conductivity), self.cut_lines(known.tobytes())
+        drops, parts = np.zeros(len(resistance)), []
+        for cells, nodes in cut.pieces:
+            before, behind = np.zeros((2, len(nodes)))
             of_part = resistance[cells]
-            before = np.concatenate([[0], np.cumsum(of_part)])
-            behind = np.concatenate([np.cumsum(of_part[::-1])[::-1], [0]])
-            first, last = heads[nodes[[0, -1]]]
+            np.cumsum(of_part, out=before[1:])
+            np.cumsum(of_part[::-1], out=behind[-2::-1])
+            parts.append((nodes, before, behind, before[-1]))
+        ends, wholes = cut.ends, np.array([whole for *_, whole in parts])
+        if cut.join:
+            heads, differences = junction_heads(heads, known, ends, 1 / wholes)
+        else:
+            differences = heads[ends[:, 1]] - heads[ends[:, 0]]
+        total = heads.copy()
+        for (cells, _), (nodes, before, behind, whole), difference in zip(
+            cut.pieces, parts, differences, strict=True
+        ):
+            first, last = heads[nodes[0]], heads[nodes[-1]]
             total[nodes] = first * behind / whole + last * before / whole
-            drops[cells] = difference * of_part / whole
-            parts.append((nodes, before, behind, whole))
+            drops[cells] = difference * resistance[cells] / whole
         steepness = (drops / self.lengths)[self.points.elements]
 
         def inverse_of(conductivity: Array) -> Callable[[Array], Array]:

@@ -86,6 +86,8 @@ class JointWater:
         self.law: Law[Any] = case.law
         #: heights of heel and toe [m] and path coordinate at the points of `head`
         self.along = lru_cache(maxsize=4)(self._along)
+        #: of the last loadings, see `_head`
+        self.head = lru_cache(maxsize=8)(self._head)
 
     def _along(self, matrix: CsrMatrix | None) -> tuple[Array, Array, Array]:
         along = self.system.fields
@@ -93,7 +95,7 @@ class JointWater:
         heel, toe, xi = values if matrix is None else [matrix @ field for field in values]
         return heel, toe, xi
 
-    def head(self, loading: Loading, matrix: CsrMatrix | None = None) -> Array:
+    def _head(self, loading: Loading, matrix: CsrMatrix | None = None) -> Array:
         """Head [m] in a joint of uniform transmissivity, at the joint's nodes or at the points that
         an interpolation matrix of `JointFields` leads to: linear along the joint between the heads
         of `heads_at_ends`, along the whole path where joints meet. With a waterstop: that of the

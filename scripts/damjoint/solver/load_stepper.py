@@ -133,21 +133,21 @@ class LoadStepper:
         if self.state.time > 0 and self.history.saved_until < self.state.time:
             self.history.save(self.state)
 
-    def weigh(self) -> bool:
-        """Solve for the weight alone, from where displacements count; whether it converges.
+    def weigh(self) -> StepResult | None:
+        """Solve for the weight alone, from where displacements count; None if it does not converge.
 
         The state has no row in the history.
         """
         step = self.model.advance(self.state, 0.0, self.control(0.0))
         self.weight_with_water = step is None and bool(self.case["weight_first"])
         if step is None:
-            return False
+            return None
         self.state = step.state
         if self.case["weight_first"]:
             self.history.at_rest = self.state
         if self.drives:
             self.displacement_at_begin = self.controlled_displacement()
-        return True
+        return step
 
     def controlled_displacement(self) -> float:
         """The displacement that the case prescribes, in the last state [m]; under dissipation
@@ -199,7 +199,7 @@ class LoadStepper:
             while the time is before the target:
                 step = direct step to the time (the strategies in turn)
                 if it moves the pressure too far:    halve it, and try again
-                if none and the weight is in it:     weigh, and try again
+                if none and the weight is in it:     weigh, and try again if that is not linear
                 if none:                             over the limit point, along the equilibrium
                                                      path or by relaxation
                 if none and it can be cut no more:   the whole step by the fallback, or stop
@@ -226,9 +226,12 @@ class LoadStepper:
                 continue
             if step is None and not weighed:
                 weighed = True
-                if self.weigh():
+                if weight := self.weigh():
                     cuts += 1
-                    continue
+                    if weight.iterations > 1:
+                        continue
+                    # a linear response: the step from there begins as the one that has failed
+                    begin = self.state
             if step is None and not self.beyond_path(smallest):
                 step = self.over_limit_point(time, cuts, smallest)
             if step is None:
