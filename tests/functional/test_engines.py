@@ -473,6 +473,11 @@ def test_a_face_that_is_not_divided_where_bodies_meet_is_refused(tmp_path):
         solve.check(load(str(tmp_path / "own.case")))
 
 
+#: Columns of water in time in every step, and those whose largest value they are compared with.
+WATER = {"water": "water", "water_in": "water", "void": "water", "p_max": "p_max", "p_min": "p_max"}
+WATER |= {"Re": "Re"}
+
+
 def difference(one, other):
     """The largest difference of two columns; 0 where both have no value."""
     assert (np.isnan(one) == np.isnan(other)).all()
@@ -498,6 +503,12 @@ def agree(case, tmp_path):
                     for column in there:
                         worst = difference(rows[0][column], rows[1][column])
                         assert worst <= 1e-6 * max(sizes), (time, column)
+        for name, of_scale in WATER.items() if "water" in a.history else ():
+            scale = np.abs(b.history[of_scale]).max()
+            assert a.history[name] == pytest.approx(b.history[name], abs=1e-6 * scale), name
+        if "water" in a.history:  # at the toe, of the largest flux
+            largest = b.history["Re"].max() * b.case["visc"] / 2
+            assert a.history["flux"] == pytest.approx(b.history["flux"], abs=1e-6 * largest)
         for one, other in zip(a.joints, b.joints, strict=True):
             scale = np.abs([one.last["N"], one.last["T"], one.last["U"]]).max()
             for name in ("N", "T", "U", *(["T_z"] if one.case["dim"] == 3 else [])):
@@ -508,3 +519,42 @@ def agree(case, tmp_path):
                 reach = 1e-6 * one.case.joint_along
                 assert one.last[name] == pytest.approx(other.last[name], abs=reach), name
     return fast
+
+
+#: Water in time on a dam of 28 m without tension: parameters and levels.
+IN_TIME = {
+    "voids": ({"time_unit": 1.0, "storage": 1e-11, "pressure_min": -1e5}, (30.0, 44.0, 20.0)),
+    "in a lift": (
+        {"time_unit": 20.0, "lift_heights": (15.0,), "uplift": ("none", "flow")},
+        (30.0, 44.0),
+    ),
+    "a crack that fills": ({"time_unit": 600.0, "storage": 1e-12, "order": 2.0}, (30.0, 44.0)),
+    "a film that closes": ({"time_unit": 5.0, "storage": 1e-12}, (30.0, 44.0, 20.0)),
+    "steady before": ({"time_unit": 60.0, "time_start": 1.0, "weight_first": 1.0}, (30.0, 44.0)),
+}
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [*list(IN_TIME)[:2], *(pytest.param(s, marks=pytest.mark.heavy) for s in list(IN_TIME)[2:])],
+)
+def test_runs_of_both_engines_agree_on_water_in_time(scene, tmp_path):
+    settings, levels = IN_TIME[scene]
+    dam = {"law": "friction", "adhesion": 0.0, "mu": 1.5, "dam_base": 28.0, "n_joint": 10.0}
+    case = load("dam", dam | {"uplift": "flow"} | settings, levels, None, 5)
+    (fast,) = agree(case, tmp_path)
+    if scene == "voids":
+        assert fast.history["void"].max() > 1e-6
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"drains": 1.0}, {"joint_slope": 3.0}, {"pressure_step": 1e4}, {"drive": "heel"}],
+)
+def test_water_in_time_that_one_engine_can_not_compute_is_refused(settings):
+    case = load("dam", {"uplift": "flow", "time_unit": 60.0} | settings, (30.0, 40.0))
+    (name,) = settings
+    with pytest.raises(
+        InputError, match=f"time_unit = 60: must be 0 with engine = getdp and {name}"
+    ):
+        solve.check(case)

@@ -397,13 +397,26 @@ class Mesh:
         for i, of_face in enumerate(entities):
             gmsh.model.addPhysicalGroup(d, of_face, first + i)
 
-    def write(self, path: Path) -> None:
+    def add_node_points(self) -> None:
+        """Make the nodes of each joint points of a physical group, see pro/flow_in_time.pro."""
+        gmsh, first, layer = start_gmsh(), *(int(constants()[n][0]) for n in ("NODES", "LAYER"))
+        highest = int(gmsh.model.mesh.getMaxElementTag())
+        for k, joint in enumerate(self.joints):
+            nodes, point = joint.surface.node_tags, gmsh.model.addDiscreteEntity(0)
+            tags = highest + 1 + np.arange(len(nodes))
+            gmsh.model.mesh.addElementsByType(point, 15, tags, nodes)
+            gmsh.model.addPhysicalGroup(0, [point], first + k * layer)
+            highest += len(nodes)
+
+    def write(self, path: Path, node_points: bool = False) -> None:
         """Write the mesh, which must be Gmsh's current one, for GetDP (MSH 2.2, binary).
 
-        Raises OSError if the disk is full, which Gmsh does not report; InputError as
-        `face_entities`.
+        node_points: with points at the nodes of the joints. Raises OSError if the disk is full,
+        which Gmsh does not report; InputError as `face_entities`.
         """
         gmsh = start_gmsh()
+        if node_points:
+            self.add_node_points()
         if self.divided:
             self.divide_faces()
         gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)

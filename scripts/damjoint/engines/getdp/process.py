@@ -19,6 +19,7 @@ from ... import InputError, RunError, data
 from ...input.case import Case
 from ...input.parameters import assignments, constants, declared, listing, quoted
 from ...input.scene import LINES, SIDES, TRACTION
+from ...input.values import flows_in_time
 from ...mesh.chord import Chord
 from ...mesh.joint_mesh import heel_normal
 from ...mesh.mesh import Mesh
@@ -296,7 +297,16 @@ class Runner:
         fields: also displacement and stress; on_step: called with the time of each converged step.
         Raises RunError, OSError (a full disk, which GetDP itself does not notice).
         """
-        problem = write_problem(case, mesh, folder, {"views": 0.0, "fields": float(fields)})
+        problem = write_problem(
+            case,
+            mesh,
+            folder,
+            {
+                "views": 0.0,
+                "fields": float(fields),
+                "node_points": float(any(map(flows_in_time, case.joints))),
+            },
+        )
         steps, of_joints = [], []
 
         def watch(line: str) -> None:

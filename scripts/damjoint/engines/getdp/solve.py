@@ -50,9 +50,7 @@ def check_joint(joint: Case) -> None:
             f"law = {joint['law']}: must have a file pro/law_{joint['law']}.pro with engine = getdp"
         )
     if flows_in_time(joint):
-        raise InputError(
-            f"time_unit = {joint['time_unit']:g}: must be 0 with engine = getdp (steady flow)"
-        )
+        check_flow_in_time(joint)
     if joint["turbulent"] and joint["uplift"] == "flow":
         raise InputError("turbulent = 1: must be 0 with engine = getdp (cubic law)")
     if joint["aperture_elastic"] and joint["uplift"] == "flow":
@@ -71,6 +69,18 @@ def check_joint(joint: Case) -> None:
         )
     if joint["uplift"] == "waterstop" and joint["dim"] == 3 and joint["order"] == 2:
         raise InputError("order = 2: must be 1 with engine = getdp and uplift = waterstop in 3D")
+
+
+def check_flow_in_time(joint: Case) -> None:
+    """Raise InputError if this engine cannot run a joint that stores water, from its case."""
+    unit = f"time_unit = {joint['time_unit']:g}: must be 0 with engine = getdp"
+    if joint["dim"] == 3 or joint.geometry:
+        raise InputError(f"{unit} in 3D and in a geometry of one's own (steady flow)")
+    for name, plain in ("joint_slope", 0.0), ("drains", 0.0), ("pressure_step", 0.0):
+        if joint[name] != plain:
+            raise InputError(f"{unit} and {name} = {joint[name]:g} (steady flow)")
+    if joint["drive"] != "level":
+        raise InputError(f"{unit} and drive = {joint['drive']} (steady flow)")
 
 
 def check_user_mesh(mesh: Mesh, case: Case) -> None:
@@ -127,7 +137,7 @@ def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
     meshed = time.perf_counter() - start
     with tempfile.TemporaryDirectory(prefix="damjoint-") as name, ThreadPoolExecutor(2) as pool:
         mesh_file = Path(name) / "scene.msh"
-        mesh.write(mesh_file)
+        mesh.write(mesh_file, node_points=any(map(flows_in_time, case.joints)))
         case = case.with_joints([joint.of_case for joint in mesh.joints])
         if case.geometry:
             case = with_paths(case, mesh.joints)

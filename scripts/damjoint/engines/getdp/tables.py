@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from ...input.case import Case
+from ...input.values import flows_in_time
 from ...mesh.mesh import Mesh
 from ...model.fields import Field
 from ...model.results import (
+    FILM,
     FLUX,
     JOINT,
     THICKNESS,
@@ -33,6 +35,8 @@ PRINTED_OF_JOINTS = [
     *("crack_length", "process_zone", "slip_length", "max_opening"),
     *("N", "T", "M", "flux", "U", "M_U", "broken_length", "bonded_length", "T_z"),
 ]
+#: and of water.txt, after "water": zero in a joint that stores none
+PRINTED_OF_WATER = ["water", "water_in", "void", "p_max", "p_min"]
 
 
 def read_simple_table(path: Path, components: int = 3) -> tuple[np.ndarray, np.ndarray]:
@@ -82,7 +86,29 @@ def read_history(case: Case, folder: Path) -> dict[str, np.ndarray]:
         rows = of_joints[k::number][: len(steps)]
         names = [column_of(name, k) for name in PRINTED_OF_JOINTS]
         printed |= dict(zip(names, rows.T, strict=True))
+    if any(map(flows_in_time, case.joints)):
+        of_water = complete_rows(folder / "water.txt", PRINTED_OF_WATER)
+        for k, joint in enumerate(case.joints):
+            rows = of_water[k::number][: len(steps)]
+            names = [column_of(name, k) for name in PRINTED_OF_WATER]
+            printed |= dict(zip(names, rows.T, strict=True))
+            printed[column_of("Re", k)] = np.zeros(len(steps))
+            if flows_in_time(joint) and len(steps):
+                flux = step_flux(folder / f"step_flux_{k}.txt", len(steps))
+                printed[column_of("Re", k)] = 2 / joint["visc"] * np.abs(flux).max(axis=1)
+                printed[column_of("flux", k)] = flux[:, -1]
     return printed | {"tail_level": np.array([case.tail_at(time) for time in printed["time"]])}
+
+
+def step_flux(path: Path, number: int) -> np.ndarray:
+    """Flux in the elements of a joint (steps, elements), from heel to toe, of the first steps.
+
+    Raises OSError, ValueError if the file is missing or incomplete.
+    """
+    lines = path.read_text().split("\n")[:-1]
+    table = np.loadtxt(lines, ndmin=2)
+    elements = len(np.unique(table[:, 0]))
+    return table[: number * elements, -1].reshape(number, -1)[:, table[:elements, 0].argsort()]
 
 
 def saved_times(case: Case, history: dict[str, np.ndarray], stopped: bool) -> dict[int, float]:
@@ -109,8 +135,18 @@ def read_joint(
         """A column that not every joint has."""
         if name not in joint_columns(joint_case):
             return np.full((len(nodes), 1), np.nan)
+        if name in FILM:
+            return film(name)
         file = name if name in FLUX | THICKNESS else "law_scalar"
         return node_means(rows, table(file, 1)[1], len(nodes))
+
+    def film(name: str) -> np.ndarray:
+        """A column of water that is stored in the joint."""
+        if name == "Re":
+            return 2 / joint_case["visc"] * np.abs(more("flux"))
+        at, share = table("void_fraction", 1)
+        along = np.argsort(at[:, 0])
+        return np.interp(nodes[:, 0], at[along, 0], share[along, 0])[:, None]
 
     order = [1, 0, 2]  # y, x, z: normal, tangent 1, tangent 2
     points, jump = table("jump")
