@@ -346,6 +346,8 @@ def test_check_and_critical_are_those_of_the_commands(command, tmp_path):
     assert all(line in out for line in limit.statement)
     assert limit.equilibria.level.max() == pytest.approx(limit.value)
     case = dj.case("dam", levels=40, n_joint=20, law="friction")
+    dam, _ = limit.plot().axes  # the dam in its last equilibrium, beside the curve
+    assert dam.get_title("left").endswith("dashed: undeformed") and dam.get_aspect() == 1
     assert repr(dj.critical(case)) == "\n".join(limit.statement)
     with pytest.raises(dj.InputError, match="needs drains"):
         dj.critical("dam", of="uplift", levels=40, n_joint=20)

@@ -148,7 +148,8 @@ def reached(state: str, result: Results) -> str:
     case, estimate = result.case, result.info.get("error_estimate")
     if not result.last:
         return state
-    words = f"{state} at level {result.last['level']:.4g} m of {case.levels[-1]:.4g} m"
+    last = result.last
+    words = f"{state} at level {last['level']:.4g} m, t = {last['time']:.4g} of {case.times[-1]:g}"
     if estimate:
         meshes = estimate["n_joint"]
         errors = [q["relative"] for q in estimate["quantities"].values() if q["used"]]

@@ -190,8 +190,7 @@ class Live:
 
 def level_reached(case: Case, time: float) -> str:
     """What a static step has reached."""
-    levels = f"level {case.level_at(time):.3g} m of {case.levels[-1]:.4g} m"
-    return f"{levels}, t = {time:.3g} of {case.times[-1]:g}"
+    return f"level {case.level_at(time):.4g} m, t = {time:.4g} of {case.times[-1]:g}"
 
 
 def save(folder: str, last: tuple[Case, str, Write] | None) -> None:

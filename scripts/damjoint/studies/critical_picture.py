@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..input.case import Case
 from ..mesh.mesh import mesh_of
+from ..model.fields import Solution
 from ..model.loads import Loading
 from ..model.results import Results
 from ..pictures.drawing import (
@@ -23,10 +23,13 @@ from ..pictures.drawing import (
     ORANGE,
     RED,
     WATER,
+    panels,
     picture_style,
     widen,
     write_picture,
 )
+from ..pictures.drawing import figure_of as drawing_of
+from ..pictures.run_picture import draw_dam
 from ..pictures.scene import loads_label, state_label
 from ..solver.path import Point
 from ..units import LENGTHS, unit
@@ -36,13 +39,16 @@ from .failure_path import FailurePath, Trial
 #: Ratio of the largest to the smallest value above which the values have a logarithmic axis.
 WIDE = 30
 GRAVITY = "gravity method"
+#: Widths of the dam and of a diagram, height below the heading [inches]; letters in an inch of the
+#: heading's title and of its other lines.
+DAM, CURVE, HEIGHT, TITLE, FACT = 7.0, 5.5, 5.4, 12, 14
 #: Line styles of the gravity method's values, by its assumptions.
 DASHES: tuple[Any, ...] = ":", "--", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 3))
 
 
 class Content(NamedTuple):
     """Content of the picture: case, varied quantity and its unit, trials, what the search found,
-    its last equilibrium.
+    its last equilibrium, and this with the fields of the bodies.
     """
 
     case: Case
@@ -51,6 +57,7 @@ class Content(NamedTuple):
     trials: Sequence[Trial]
     answer: CriticalValue
     result: Results | None
+    solution: Solution | None = None
 
     @property
     def facts(self) -> list[str]:
@@ -90,15 +97,25 @@ def draw(content: Content, path: Path) -> None:
 @picture_style()
 def figure_of(content: Content) -> Figure:
     """Draw level against crest displacement on both sides of the critical value; unless that is a
-    level, also the highest level with each value.
+    level, also the highest level with each value; below, the dam in its last equilibrium.
     """
-    single = content.of == "level"
-    figure = Figure(figsize=(7.5 if single else 12, 5.4), layout="constrained")
-    FigureCanvasAgg(figure)
-    *of_trials, of_paths = figure.subplots(1, 1 if single else 2, squeeze=False)[0]
-    title = textwrap.fill(heading(content), 75 if single else 120)
-    lines = [textwrap.fill(fact, 100 if single else 160) for fact in content.facts]
-    figure.suptitle("\n".join([title, *lines]), fontsize=9.5, parse_math=False)
+    curves, wide = 1 if content.of == "level" else 2, DAM if content.solution else 0.0
+    width = CURVE * curves + wide
+    title = textwrap.wrap(heading(content), int(TITLE * width))
+    lines = [line for fact in content.facts for line in textwrap.wrap(fact, int(FACT * width))]
+    head = 0.15 + 0.2 * len(title) + 0.17 * len(lines)
+    figure = drawing_of(width, head + HEIGHT)
+    rows = figure.subfigures(2, 1, squeeze=False, height_ratios=(head, HEIGHT))
+    top, below = rows[:, 0]
+    for texts, y, size in ((title, 0.08, 11), (lines, 0.12 + 0.2 * len(title), 9)):
+        place = 0.1 / width, 1 - y / head
+        top.text(*place, "\n".join(texts), va="top", fontsize=size, parse_math=False)
+    of_curves = below
+    if content.solution:
+        ratios = wide, CURVE * curves
+        of_dam, of_curves = below.subfigures(1, 2, squeeze=False, width_ratios=ratios)[0]
+        draw_dam(of_dam, content.solution, float(content.solution.result.last["time"]))
+    *of_trials, of_paths = panels(of_curves, 1, curves, bottom=0.55, top=0.2)[0]
     for axes in of_trials:
         draw_trials(axes, content)
     draw_paths(of_paths, content)

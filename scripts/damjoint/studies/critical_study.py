@@ -145,20 +145,20 @@ def growth_lines(answer: CriticalValue) -> list[str]:
 def save(study: Session, search: Search, answer: CriticalValue) -> None:
     """Write the last equilibrium as `damjoint run` does, critical.csv and its picture."""
     state, _ = end_of(answer.error)
+    shown = content(search, answer)
     entries = {"critical": as_json(search, answer), "wall_seconds": {"search": study.seconds}}
-    result = last_state(search, answer.point) if answer.point else None
+    result, solution = shown.result, shown.solution
     if answer.point and result:
         result.info = about(answer.point.model.equilibrium.bulk) | entries
         study.save(result, *early_end(result, answer.error))
-        if not answer.error:
-            solution = solution_at(answer.point, result)
+        if solution:
             study.add(result, lambda out: write_fields(solution, out / "fields"))
     else:
         study.save_without_results(state or folders.COMPLETE, answer.doubt, entries)
     if not search.trials:
         return
     write_csv(study.out / "critical.csv", table(search))
-    picture.draw(content(search, answer), study.out / f"{search.case.name}_critical.png")
+    picture.draw(shown, study.out / f"{search.case.name}_critical.png")
 
 
 def solution_at(point: Point, result: Results) -> Solution:
@@ -175,9 +175,12 @@ def solution_at(point: Point, result: Results) -> Solution:
 
 def content(search: Search, answer: CriticalValue) -> picture.Content:
     """The content of the picture."""
-    result = last_state(search, answer.point) if answer.point else None
     what = search.case, search.of, search.unit, search.trials
-    return picture.Content(*what, answer, result)
+    if not answer.point:
+        return picture.Content(*what, answer, None)
+    result = last_state(search, answer.point)
+    solution = None if answer.error else solution_at(answer.point, result)
+    return picture.Content(*what, answer, result, solution)
 
 
 def as_json(search: Search, answer: CriticalValue) -> dict[str, Any]:
