@@ -113,8 +113,8 @@ def results_page() -> str:
         "A row per joint node and requested level, sorted by level, joint, x and z; with order 2 "
         "the midpoints of edges and rectangles, too. Stresses are those of the joint law at the "
         "node, with internal variables of its own. `lambda` is written with law = friction only, "
-        "`flux` with uplift = flow only, `void_fraction` and `Re` with `time_unit` > 0 only; of "
-        "several joints, those without it have nan.",
+        "`flux` with uplift = flow only, `void_fraction`, `Re` and `water_mass` with "
+        "`time_unit` > 0 only; of several joints, those without it have nan.",
         joint,
         "## history.csv",
         "A row per converged step. Forces are per metre of thickness, in 3D too. Of several "

@@ -152,6 +152,10 @@ def test_mass_is_kept_in_every_step(unit, lowest):
     void = result.joint["void_fraction"]
     assert 0 <= void.min() and void.max() <= 1 and (void.max() > 0) == (history["void"][-1] > 0)
     assert result.joint["Re"].max() <= history["Re"].max() * (1 + 1e-12)
+    end = result.at(result.case.times[-1])
+    s, mass = (end[name][np.argsort(end["s"])] for name in ("s", "water_mass"))
+    total = np.diff(s) @ (mass[1:] + mass[:-1]) / 2
+    assert total == pytest.approx(1000 * history["water"][-1], rel=1e-9)
     if unit == 1:
         assert history["void"].max() > 1e-7 and history["p_min"].min() == pytest.approx(lowest)
 

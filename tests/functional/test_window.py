@@ -1011,3 +1011,20 @@ import -window root resized.png
 kill $gui
 cat status.txt
 """
+
+
+def test_a_flood_shows_its_time_and_the_pressure_of_each_step(open_window):
+    """Case flood: seconds of a unit of t and storage with their units; the curve of the pressure
+    moves with the level, and the caption has the hours that have passed.
+    """
+    user = open_window("flood", n_joint=8.0, order=1.0)
+    labels = [name for name in gmsh.onelab.getNames() if "Flow in time" in name]
+    assert any("seconds of a unit" in n and n.endswith("[s]") for n in labels)
+    assert any("stored by compressibility" in n and "[m per Pa]" in n for n in labels)
+    user.run()
+    (scene,) = user.session.scenes
+    last = len(scene.times) - 1
+    assert "16 of 16 h" in views.caption(scene, last)[0]
+    assert "8 of 16 h" in views.caption(scene, last // 2)[0]
+    assert len({tuple(scene.result.at(t)["p"]) for t in scene.times}) == len(scene.times) > 8
+    assert [n for n in user.views if "water pressure" in n or n.startswith("pressure")]

@@ -14,6 +14,7 @@ import gmsh
 import numpy as np
 
 from ..input.case import Case
+from ..input.values import flows_in_time
 from ..model.fields import (
     BROKEN,
     CLOSED,
@@ -24,7 +25,7 @@ from ..model.fields import (
     nearest_rows,
     state_of,
 )
-from ..units import LENGTHS, STRESSES, unit, with_unit
+from ..units import LENGTHS, STRESSES, unit, unit_of_time, with_unit
 from . import layout as places
 from .camera import CLIPPED, undeformed_camera
 from .curves import show_graphs
@@ -200,10 +201,21 @@ def caption(scene: SolvedScene, step: int) -> tuple[str, str, str]:
     where = scene.numbers[step].positions[0]
     last = scene.result.case.times[-1]
     return (
-        f"level {now['level']:.4g} m{tail} (t = {time:.4g} of {last:g})",
+        f"level {now['level']:.4g} m{tail} (t = {time:.4g} of {last:g}{passed(scene, time)})",
         f"{name}: {state}" if name else state,
         ", ".join([*factors, f"{resultant}: {where}"]),
     )
+
+
+def passed(scene: SolvedScene, time: float) -> str:
+    """Of a time t, the time that has passed in water that is stored in a joint, in words."""
+    case = scene.result.case
+    if not any(map(flows_in_time, case.joints)):
+        return ""
+    start, last = case["time_start"], case.times[-1]
+    name, factor = unit_of_time((last - start) * case["time_unit"])
+    now, end = (max(t - start, 0) * case["time_unit"] * factor for t in (time, last))
+    return f", {now:.4g} of {end:.4g} {name}"
 
 
 def show_deformed(gallery: Gallery, deformed: Deformed, display: Display) -> list[Entry]:

@@ -41,6 +41,7 @@ FLUX = {"flux": ("kg/(m s)", "mass flux towards the toe, mean of the elements ar
 FILM = {
     "void_fraction": ("-", "part of the aperture that is not filled with water"),
     "Re": ("-", "Reynolds number of the flow, 2 flux / visc"),
+    "water_mass": ("kg/m2", "mass of the water in the joint, per area, with its compression"),
 }
 
 #: Additional column where the joint is grouted or sawn.

@@ -144,9 +144,9 @@ def read_joint(
         """A column of water that is stored in the joint."""
         if name == "Re":
             return 2 / joint_case["visc"] * np.abs(more("flux"))
-        at, share = table("void_fraction", 1)
+        at, values = table(name, 1)
         along = np.argsort(at[:, 0])
-        return np.interp(nodes[:, 0], at[along, 0], share[along, 0])[:, None]
+        return np.interp(nodes[:, 0], at[along, 0], values[along, 0])[:, None]
 
     order = [1, 0, 2]  # y, x, z: normal, tangent 1, tangent 2
     points, jump = table("jump")
