@@ -199,7 +199,8 @@ def results_page() -> str:
         "varied values; the critical level [m], its `mode`, the `joint` that fails, whether it is "
         "`confirmed` and by what, its derivatives `d_...` with the parameters where FORM and SORM "
         "have asked for them. `run.json` has the results under `reliability`; "
-        "`design_point.case` is the case of the design point.",
+        "`design_point.case` is the case of the design point, `CASE_reliability.png` a picture of "
+        "the probabilities by each method and of the importance factors.",
         "## calibration.csv, residuals.csv",
         "Written by `damjoint calibrate`. A row per free parameter: `parameter`, `unit`, `start`, "
         "`estimate`, `low` and `high` of its 95 % interval, `determined` (1, 0), and "

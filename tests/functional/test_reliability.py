@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import damjoint as dj
 import numpy as np
@@ -15,6 +16,9 @@ from closed_forms import WATER
 from damjoint.input.resolve import load
 from damjoint.studies import reliability
 from damjoint.studies.critical import Search
+from damjoint.studies.reliability import Reliability
+from damjoint.studies.reliability_picture import figure_of_reliability
+from numpy.testing import assert_allclose
 from processes import without_progress
 from scipy import stats
 
@@ -197,6 +201,7 @@ def test_files_and_continuation(command, tmp_path):
     assert levels == rows(tmp_path / "out/reliability.csv")
     info = json.loads((tmp_path / "out/run.json").read_text())
     (entry,) = info["reliability"]["of"]
+    assert (tmp_path / "out/dam_reliability.png").stat().st_size > 10_000
     assert info["state"] == "complete" and info["reliability"]["critical_levels"] == len(levels)
     assert entry["agreement"] in out and f"{entry['form']:.4g}" in out
     case = load(str(tmp_path / "out/design_point.case"))
@@ -254,6 +259,23 @@ def test_a_scheduler_computes_the_same(command, tmp_path):
     assert far[1].replace("far", "near") == near[1]
     by_key = lambda name: {r["key"]: r for r in rows(tmp_path / name / "reliability.csv")}
     assert by_key("far") == by_key("near")
+
+
+def test_the_picture_has_each_probability_its_interval_and_the_importance():
+    design, shares = {"mu": 0.56, "level": 39.9}, {"mu": 0.7, "level": 0.3}
+    of_base = Reliability("base", 2.7, (2.0, 1.0), design, shares, True, 0.0034, None, 0.0043)
+    of_all = replace(of_base, joint="", sampled=0.0025, low=0.001, high=0.005, samples=50)
+    values = ["mu = 0.56", "level = 39.9 m"]
+    left, right = figure_of_reliability([of_base, of_all], "dam", values).axes
+    labels = [text.get_text() for text in left.get_yticklabels()]
+    assert labels[:2] == ["base: FORM", "base: SORM (Tvedt)"] and len(labels) == 5
+    assert labels[-1] == "all joints: 50 samples"
+    interval, sampled = left.get_lines()[-2:]
+    assert_allclose(interval.get_xdata(), (0.001, 0.005))
+    assert_allclose(sampled.get_xdata(), 0.0025)
+    assert_allclose([bar.get_width() for bar in right.patches], (70, 30))
+    none = replace(of_all, form=None, tvedt=None, design={}, importance={}, sampled=0.0)
+    assert not figure_of_reliability([none], "dam", []).axes[0].get_lines()
 
 
 def test_a_level_that_is_not_computed_counts_as_a_failure(command, monkeypatch):

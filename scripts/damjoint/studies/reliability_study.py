@@ -18,7 +18,7 @@ from ..progress import Progress
 from ..session import session
 from ..storage import atomic_write
 from ..units import with_slash
-from . import sampling
+from . import reliability_picture, sampling
 from .reliability import (
     CriticalLevels,
     Reliability,
@@ -33,6 +33,8 @@ from .result_file import result_file
 
 #: Files of the study: the critical levels, and the case of the design point.
 ROWS, DESIGN = "reliability.csv", "design_point.case"
+#: Ending of the name of the picture, after that of the case.
+PICTURE = "_reliability.png"
 
 
 def reliability(
@@ -53,10 +55,10 @@ def reliability(
     openturns()
     check_jobs(jobs)
     variables.normal()
-    path, columns = out / ROWS, columns_of(variables)
-    with session(case, out, keep=of_same_columns(path, columns)) as study:
+    rows, columns = out / ROWS, columns_of(variables)
+    with session(case, out, keep=of_same_columns(rows, columns)) as study:
         numeric = [c for c in columns if c in ("critical_level", "confirmed")]
-        with result_file(path, columns, numeric) as (file, known):
+        with result_file(rows, columns, numeric) as (file, known):
             levels = CriticalLevels(case, variables, jobs, scheduler, known)
             with Progress(case.name, bar_format="{desc} {elapsed}", leave=False) as shown:
                 doing = ""
@@ -77,6 +79,12 @@ def reliability(
             design = design_case(levels, results[-1])
             with atomic_write(out / DESIGN) as part:
                 part.write_text(case_text(design), encoding="utf-8")
+            values = [
+                f"{name} = {value:.4g} {unit_of(name)}".removesuffix(" -")
+                for name, value in results[-1].design.items()
+            ]
+            path = out / f"{case.name}{PICTURE}"
+            reliability_picture.draw(results, heading(levels), values, path)
         entries = {"reliability": as_json(levels, results), "parameters": case.values}
         study.save_without_results("complete", "", entries)
     return results, printed_lines(levels, results, out)
@@ -146,12 +154,17 @@ def methods(one: Reliability) -> list[tuple[str, str, str]]:
     return rows
 
 
+def heading(levels: CriticalLevels) -> str:
+    """What the probability is of."""
+    case, fixed = levels.case, "level" not in levels.variables.names
+    what = f"level {case.levels[-1]:g} m" if fixed else "the level"
+    return f"{case.name}: probability that {what} exceeds the critical level"
+
+
 def printed_lines(levels: CriticalLevels, results: Sequence[Reliability], out: Path) -> list[str]:
     """The printed lines."""
     *single, whole = results
-    case, fixed = levels.case, "level" not in levels.variables.names
-    what = f"level {case.levels[-1]:g} m" if fixed else "the level"
-    lines = [f"{case.name}: probability that {what} exceeds the critical level; {out}", ""]
+    lines = [f"{heading(levels)}; {out}", ""]
     interval = f"{sampling.CONFIDENCE:.0%} interval"
     heads = ["method", f"probability ({interval})", f"beta ({interval})"]
     lines += [tabulate(methods(whole), heads, disable_numparse=True), ""]
