@@ -392,6 +392,7 @@ def test_steps_solve_the_equations_of_all_unknowns(tmp_path, alpha):
     record = smooth_record(tmp_path / "r.csv", 6.0, duration=0.5)
     quake = earthquake(record, DAM | {"hht_alpha": alpha, "record_rest": 0.0}, "30")
     problem, system = quake.problem, quake.system
+    assert problem.rock  # which is not among the unknowns of the steps
     interface, laws = problem.model.equilibrium.interface, problem.model.equilibrium.laws
     at_points = lambda state: interface.jumps(interface.at_points, state.jump)
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, IntArray
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,11 @@ class Motion:
     def at_rest(size: int) -> Motion:
         """No motion."""
         return Motion(*np.zeros((3, size)))
+
+    def at(self, unknowns: IntArray) -> Motion:
+        """That of some unknowns."""
+        parts = self.displacement, self.velocity, self.acceleration
+        return Motion(*(part[unknowns] for part in parts))
 
 
 @dataclass(frozen=True)

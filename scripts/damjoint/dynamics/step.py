@@ -28,6 +28,7 @@ from ..solver.model import Model, StepResult
 from ..solver.newton import NotConverged
 from ..solver.state import State, StepLaws
 from ..solver.step import Plan, Start, solve
+from .massless import MasslessRock
 from .scheme import HHT, Motion
 from .system import System
 
@@ -56,6 +57,8 @@ class Problem:
     dashpots: Array
     #: whether the water in the joints flows in the steps: quake_uplift = transient
     transient: bool = False
+    #: that follows the bodies on it; None: it is eliminated in each step
+    rock: MasslessRock | None = None
 
     @property
     def at_rest(self) -> Moving:
@@ -76,10 +79,12 @@ class TimeStep:
         self.rate, acceleration = scheme.rates(dt)
         #: 1 + alpha
         self.weight = weight = 1 + scheme.shift
-        matrix = acceleration * system.mass + weight * (
-            system.stiffness + self.rate * problem.damping
-        )
-        self.factors = partial_factors(matrix.tocsr(), system.jumps)
+        matrices, rock = (system.mass, system.stiffness, problem.damping), problem.rock
+        #: mass, stiffness and damping of the unknowns of the steps (k, k), and the jumps among them
+        self.mass, self.of_bodies, self.damping = map(rock.reduce, matrices) if rock else matrices
+        self.jumps = np.searchsorted(rock.kept, system.jumps) if rock else system.jumps
+        matrix = acceleration * self.mass + weight * (self.of_bodies + self.rate * self.damping)
+        self.factors = partial_factors(matrix.tocsr(), self.jumps)
         #: S (j, j)
         self.stiffness = self.factors.schur / weight
         self.equilibrium = problem.model.equilibrium
@@ -152,15 +157,18 @@ class TimeStep:
     def on_jumps(self, begin: Moving, loads: tuple[Array, Array], lifted: Array) -> Array:
         """The loads (j,) of a step, see `advance`; lifted: of the water in the joints."""
         problem, motion, static = self.problem, begin.motion, self.problem.static
-        system, alpha, weight = problem.system, problem.scheme.shift, self.weight
+        alpha, weight = problem.scheme.shift, self.weight
+        load = weight * loads[1] - alpha * loads[0]
+        if problem.rock:
+            motion, load = motion.at(problem.rock.kept), load[problem.rock.kept]
         of_velocity, of_acceleration = problem.scheme.history(motion, self.dt)
-        right = system.mass @ of_acceleration
-        if problem.damping.nnz:
-            right += problem.damping @ (weight * of_velocity + alpha * motion.velocity)
+        right = self.mass @ of_acceleration
+        if self.damping.nnz:
+            right += self.damping @ (weight * of_velocity + alpha * motion.velocity)
         if alpha:
-            right += alpha * (system.stiffness @ motion.displacement)
-        right += weight * loads[1] - alpha * loads[0]
-        right[system.jumps] += alpha * begin.forces
+            right += alpha * (self.of_bodies @ motion.displacement)
+        right += load
+        right[self.jumps] += alpha * begin.forces
         on_jumps = self.factors.reduce(right) / weight + self.stiffness @ static.jump
         on_jumps += self.at_static + lifted
         return on_jumps
@@ -195,6 +203,8 @@ class TimeStep:
         interface, motion = self.equilibrium.interface, begin.motion
         traction = joints.traction(state.jump)
         displacement = self.factors.expand(state.jump - self.problem.static.jump)
+        if self.problem.rock:
+            displacement = self.problem.rock.expand(displacement)
         return Moving(
             time=begin.time + self.dt,
             state=state,

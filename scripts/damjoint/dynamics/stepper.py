@@ -16,6 +16,7 @@ from ..solver.model import LARGEST_JUMP, Model
 from ..solver.state import State
 from . import absorbing
 from .absorbing import AbsorbingRock, travel_time
+from .massless import MasslessRock
 from .published import with_corner_dashpots
 from .record import Record
 from .scheme import HHT
@@ -154,6 +155,8 @@ class Earthquake:
             system=system,
             scheme=HHT(case["hht_alpha"], weighted=not self.published),
             damping=damping,
+            # (the published dashpots change the matrices in each step)
+            rock=None if self.published else MasslessRock.of(system, damping),
             dashpots=np.array([normal, tangential, tangential]),
         )
         #: longest step [s]
