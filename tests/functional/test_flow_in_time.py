@@ -281,6 +281,19 @@ def test_steps_are_halved_where_pressure_moves_too_far():
     assert np.abs(np.diff(history["p_max"])).max() <= most
 
 
+@pytest.mark.heavy
+def test_a_film_without_compressibility_in_steps_of_milliseconds():
+    """A point that has just opened by 3 nm between closed ones: the iterates repeat.
+    The compressibility of the water itself is enough, and the hint on the stopped run has it.
+    """
+    settings = {"time_unit": 0.01, "joint_slope": 3.0}
+    stopped = dam((30.0, 44.0, 20.0), **settings).run()
+    (hint,) = (text for text in hints(stopped) if "storage" in text)
+    assert stopped.stopped and hint.endswith("storage = 4.5e-15")
+    run = dam((30.0, 44.0, 20.0), storage=float(hint.split()[-1]), **settings).run()
+    assert not run.stopped and not run.history["cuts"].any()
+
+
 def test_a_sealed_joint_must_store_water(blocks):
     """The base of the middle one of three blocks, between dry joints: its volume is given."""
     bounds = {"left": (0, 5), "middle": (5, 10), "right": (10, 15)}

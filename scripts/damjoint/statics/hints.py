@@ -6,7 +6,7 @@ import numpy as np
 
 from ..arrays import Table
 from ..input.case import Case
-from ..input.values import has_drains
+from ..input.values import flows_in_time, has_drains
 from ..laws import Evidence
 from ..model.results import Results
 from ..units import STRESSES, with_unit
@@ -18,6 +18,8 @@ from .verdict import STIFF_JOINT, stiffness_ratio, verdict
 LEAST_FOUNDATION = 1.5
 #: K_N L/E below which the joint is softer than the dam: the stress is that of a rigid block.
 SOFT_JOINT = 1
+#: Bulk modulus of water [Pa].
+WATER_MODULUS = 2.2e9
 
 
 def hints(results: Results) -> list[str]:
@@ -104,6 +106,13 @@ def hints_on_run(results: Results) -> list[str]:
         messages.append(
             "the engine getdp does not follow the equilibrium path beyond a limit point: "
             "--engine condensed does"
+        )
+    timed = [joint for joint in case.joints if flows_in_time(joint)]
+    if timed and case["storage"] == 0 and verdict(results) == "not converged":
+        width = max(joint["aperture_min"] for joint in timed)
+        messages.append(
+            "storage = 0: a film without compressibility is much stiffer in a short step than the "
+            f"joint; water in aperture_min has storage = {width / WATER_MODULUS:.2g}"
         )
     unstable = bool(levels) or verdict(results) == "not converged"
     for k, joint_result in enumerate(results.joints if last else []):
