@@ -13,8 +13,8 @@ def test_the_closure_under_the_weight_is_that_of_a_rigid_block():
     """rho g A/(K_N L) of the trapezium of 34 and 5 m, 45 m high: 6.076 um; K_N L/E = 136."""
     text = stiffness.meaning(load("dam", SMALL))
     closure = 2400 * 9.81 * (34 + 5) / 2 * 45 / (1e11 * 34)
-    assert f"closes the joint by {1e6 * closure:.4g} µm" in text
-    assert "K_N L/E = 136, K_N h/E = 13.6, K_T/K_N = 0.5" in text
+    assert f"the weight closes the joint by {1e6 * closure:.3g} µm" in text
+    assert text.endswith("K_N L/E = 136, K_N h/E = 13.6, K_T/K_N = 0.5")
 
 
 def test_repeated_runs_are_those_of_a_tenth_and_ten_times_the_stiffness(solve):
@@ -45,8 +45,6 @@ def test_only_stiffnesses_that_are_named_repeat_the_run():
     assert stiffness.named_in("all") == stiffness.named_in("") == []
 
 
-def test_a_wide_table_says_what_the_stiffnesses_mean(command):
-    words = "run", "a", "--no-picture", "--no-fields"
-    _, wide, _ = command(*words, "--wide")
-    assert "K_N = 1e+12, K_T = 1e+12 Pa/m: the weight of the dam closes the joint by" in wide
-    assert "K_N h/E" not in command(*words)[1]
+def test_a_run_says_what_the_stiffnesses_mean(command):
+    _, out, _ = command("run", "a", "--no-picture", "--no-fields")
+    assert "K_N: the weight closes the joint by 153 nm; K_N L/E = 1.67, " in out

@@ -83,12 +83,11 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
                 derived["statement"]
                 or sensitivity.text(derived["changes"], table_width(arguments)),
             )
-        lines = [*hints(result), result.info.get("error_estimate", {}).get("statement", "")]
+        lines = [stiffness.meaning(result.case) if result.last else "", *hints(result)]
+        lines.append(result.info.get("error_estimate", {}).get("statement", ""))
         if any(lines):
             say("", *filter(None, lines))
         repeated = stiffness.named_in(arguments.sensitivity or "")
-        if (repeated or arguments.wide) and result.last:
-            say("", stiffness.meaning(result.case))
         if repeated and result.last:
             runs = stiffness.repetitions(result.case, result, repeated, arguments.engine)
             say(*stiffness.lines(list(runs)))

@@ -31,21 +31,21 @@ def named_in(text: str) -> list[str]:
 
 
 def meaning(case: Case) -> str:
-    """What the stiffnesses of a case's first joint mean: its closure under the dam's weight, if the
-    section is that of the parameters, and their ratios to the stiffness of the softer body.
+    """What the stiffnesses of a case's first joint mean: its mean closure under the dam's weight,
+    if the section is that of the parameters, and their ratios to the stiffness of the softer body,
+    E/L with the joint's length L, E/h with that of an element.
     """
     joint = case.joints[0]
     young, length = min(joint["E_dam"], joint["E_found"]), joint.joint_length
     closure = ""
     if not case.geometry:
         weight = gravity.with_crack(joint, 0.0, 0.0, 0.0).N
-        closed = with_unit(weight / (joint["K_N"] * length), LENGTHS)
-        closure = f"the weight of the dam closes the joint by {closed} in the mean; "
+        closed = with_unit(weight / (joint["K_N"] * length), LENGTHS, 3)
+        closure = f"the weight closes the joint by {closed}; "
     h = length / joint["n_joint"]
     return (
-        f"K_N = {joint['K_N']:.4g}, K_T = {joint['K_T']:.4g} Pa/m: {closure}K_N L/E = "
-        f"{joint['K_N'] * length / young:.3g}, K_N h/E = {joint['K_N'] * h / young:.3g}, K_T/K_N = "
-        f"{joint['K_T'] / joint['K_N']:.3g} (L: length of the joint, h: of an element)"
+        f"K_N: {closure}K_N L/E = {joint['K_N'] * length / young:.3g}, K_N h/E = "
+        f"{joint['K_N'] * h / young:.3g}, K_T/K_N = {joint['K_T'] / joint['K_N']:.3g}"
     )
 
 
