@@ -180,9 +180,7 @@ def can_resolve(result: Results, finest: float) -> bool:
     the most elements along the joint.
     """
     return any(
-        process_zone.elements(joint) < process_zone.LEAST
-        and process_zone.least(joint.case) <= finest
-        for joint in result.joints
+        zone.least <= finest for joint in result.joints for zone in process_zone.too_short(joint)
     )
 
 

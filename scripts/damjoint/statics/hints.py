@@ -155,15 +155,14 @@ def hints_on_state(results: Results, last: dict[str, float]) -> list[str]:
             f"the crack ({crack:.3g} m) ends somewhere in an element of {element:.2g} m; "
             "--accuracy 3% chooses the mesh and estimates the error"
         )
-    if process_zone.elements(results) < process_zone.LEAST:
-        least = process_zone.least(case)
-        advice = f"; n_joint = {least} or --accuracy resolves it"
-        if least > process_zone.MOST:
-            advice = f", whatever n_joint: {least} elements would be needed"
+    for zone in process_zone.too_short(results):
+        advice = f"; n_joint = {zone.least} or --accuracy resolves it"
+        if zone.least > process_zone.MOST:
+            advice = f", whatever n_joint: {zone.least} elements would be needed"
         messages.append(
-            f"the fracture process zone is {process_zone.length(case):.2g} m long (9 pi/32 E' "
-            f"G_f/f_t^2), less than {process_zone.LEAST} elements of {element:.2g} m: the crack "
-            f"depends on the mesh{advice}"
+            f"the fracture process zone is {zone.length:.2g} m long ({zone.formula}), less than "
+            f"{process_zone.LEAST} elements of {element:.2g} m: the crack depends on the mesh"
+            f"{advice}"
         )
     if has_drains(case) and len(results.joint["time"]):  # a section's mesh has a node there
         away = np.abs(results.at()["s"] - case["drain_x"]).min()
