@@ -59,6 +59,18 @@ SAME_LEVEL = 3e-5
 #: Difference of the jumps up to which they do, over their change in the increment [-].
 SAME_JUMP = 0.02
 
+# An increment that continues the one before, as predicted, needs no halves: nothing has happened
+# in it that had not begun before
+
+#: Difference of its jumps from those extrapolated from the last increment, over their change [-].
+#: Half of the change would be a path that turns, or leads back.
+PREDICTED = 0.3
+#: The same of the level, over its change [-]: it has no limit point within the increment as long
+#: as it is below 1.
+PREDICTED_LEVEL = 0.5
+#: Part of the largest length at which the predictor's error is allowed that is tried next [-].
+SAFETY = 0.8
+
 # An increment is halved until it passes over no limit point
 
 #: Relative difference of the level at its middle from the mean of those at its ends [-].
@@ -328,11 +340,34 @@ class Point:
                 return True
         return False
 
-    @property
+    @cached_property
     def uplifts(self) -> Array:
         """The uplift in each joint [N]."""
-        joints = zip(self.state.pressures, self.model.equilibrium.interface.joints, strict=True)
+        return self.uplifts_in(self.state)
+
+    def uplifts_in(self, state: State) -> Array:
+        """The uplift in each joint in another state [N]."""
+        joints = zip(state.pressures, self.model.equilibrium.interface.joints, strict=True)
         return np.array([joint.points.weights @ pressure.points for pressure, joint in joints])
+
+    def prediction_error(self, end: Point, highest: float) -> float:
+        """How far an increment from here is off the extrapolation of the last one, over what is
+        allowed: its jumps, its level and, where the reservoir has not reached a joint, its uplift;
+        inf if there is no last one. highest: level of the path [m].
+        """
+        before, last = self.state.previous, self.movement
+        moved = end.state.jump - self.state.jump
+        ahead = float(moved @ last) / (float(last @ last) or np.inf)
+        if before is None or ahead <= 0:
+            return np.inf
+        off = float(np.abs(moved - ahead * last).max() / np.abs(moved).max())
+        levels = end.level - self.level, ahead * (self.level - before.loading.level)
+        errors = [off / PREDICTED, deviation(*levels, 2 * STRAIGHT * highest)]
+        if not end.reaches_joint(self):
+            now, then = end.uplifts - self.uplifts, self.uplifts - self.uplifts_in(before)
+            pairs = zip(now, ahead * then, strict=True)
+            errors += [deviation(*pair, 2 * FALL * end.thrust) for pair in pairs]
+        return max(errors)
 
     def unloads(self, begin: Point) -> bool:
         """Whether the level falls in the last step while damage and slip grow by a small part of
@@ -387,6 +422,8 @@ class EquilibriumPath:
         self.interval = np.nan, np.nan
         #: the longest increment [m]
         self.longest = np.inf
+        #: the predictor's error in the last increment, over what is allowed; 0: unknown
+        self.error = 0.0
         #: intervals in which no increment leads to a state of the branch, by the points before them
         self.closed = list[Point]()
 
@@ -600,7 +637,8 @@ class EquilibriumPath:
         if another and len(self.points) > 1:  # nothing has led to the first point
             self.starts.append(len(self.points))
         rise = (new[-1].level - last.level) / new[-1].level
-        growth = min(max(self.rise / max(rise, 1e-12), SHRINKING), 1.0 if shortened else GROWTH)
+        growth = min(self.rise / max(rise, 1e-12), SAFETY / self.error if self.error else np.inf)
+        growth = min(max(growth, SHRINKING), 1.0 if shortened else GROWTH)
         self.growth = growth * len(new)
         for point in new:
             self.add(point)
@@ -631,6 +669,8 @@ class EquilibriumPath:
                 continue
             if not (self.verified and point.model.equilibrium.path_dependent):
                 return [whole]
+            if self.predicted(point, whole):
+                return [whole]
             middle = self.step(point, point.further(control, by / 2), by / 2, kind)
             end = middle and self.step(middle, ahead, by / 2, kind)
             if middle and end and self.agree(point, whole, middle, end) and not end.unloads(point):
@@ -639,6 +679,10 @@ class EquilibriumPath:
                     return [middle, end]
             whole, by = middle, by / 2
         return []
+
+    def predicted(self, begin: Point, end: Point) -> bool:
+        """Whether an increment needs no halves, as it continues the one before."""
+        return False
 
     def agree(self, begin: Point, whole: Point, middle: Point, end: Point) -> bool:
         """Whether one step and two halves lead to the same state; up to unstable growth, also
@@ -807,6 +851,14 @@ class EquilibriumPath:
         control = a.towards(b.state.jump - a.state.jump)
         length = self.length(left) / 2
         return self.along(a, control, length, SMALLEST * length, b.control) if control else []
+
+
+def deviation(change: float, predicted: float, least: float) -> float:
+    """Difference of a change from the predicted one over the largest that is allowed, the part
+    PREDICTED_LEVEL of them, or a least value.
+    """
+    largest = PREDICTED_LEVEL * max(abs(change), abs(predicted))
+    return abs(change - predicted) / (max(largest, least) or 1.0)
 
 
 def movement(case: Case, crack_length: float, x: np.ndarray, moved: np.ndarray) -> str:
