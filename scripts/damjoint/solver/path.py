@@ -358,15 +358,15 @@ class Point:
         before, last = self.state.previous, self.movement
         moved = end.state.jump - self.state.jump
         ahead = float(moved @ last) / (float(last @ last) or np.inf)
-        if before is None or ahead <= 0:
+        if before is None or not before.pressures or ahead <= 0:  # the first one has no loads
             return np.inf
         off = float(np.abs(moved - ahead * last).max() / np.abs(moved).max())
         levels = end.level - self.level, ahead * (self.level - before.loading.level)
         errors = [off / PREDICTED, deviation(*levels, 2 * STRAIGHT * highest)]
         if not end.reaches_joint(self):
             now, then = end.uplifts - self.uplifts, self.uplifts - self.uplifts_in(before)
-            pairs = zip(now, ahead * then, strict=True)
-            errors += [deviation(*pair, 2 * FALL * end.thrust) for pair in pairs]
+            off = np.abs(now - ahead * then).max(initial=0.0)
+            errors.append(float(off) / (2 * FALL * end.thrust or 1.0))
         return max(errors)
 
     def unloads(self, begin: Point) -> bool:
