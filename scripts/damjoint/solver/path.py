@@ -469,6 +469,11 @@ class EquilibriumPath:
         return self.points
 
     @property
+    def counted(self) -> int:
+        """The number of points up to which the levels count."""
+        return len(self.points)
+
+    @property
     def levels(self) -> Array:
         """The level of each point [m]; -inf where loads that do not depend on it differ from those
         of the path's end.
@@ -808,7 +813,8 @@ class EquilibriumPath:
         point = self.points[top]
         if point.slides and not point.model.equilibrium.path_dependent:
             return top, self.highest
-        bounds = [(self.bound(left), left) for left in range(len(self.points) - 1)]
+        last = min(self.counted, len(self.points) - 1)
+        bounds = [(self.bound(left), left) for left in range(last)]
         possible, left = max(bounds, default=(self.highest, top))
         return left, max(possible, self.highest)
 

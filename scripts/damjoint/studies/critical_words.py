@@ -50,9 +50,9 @@ def end_of_branch(path: FailurePath) -> str:
 def withdrawn(path: FailurePath) -> str:
     """What is said of a path on which the water leaves the crack."""
     return (
-        f"at {path.points[-1].level:.6g} m points of the crack close again and part its water from "
-        "the reservoir: the equilibria beyond it have less uplift than an open crack, and no path "
-        "leads on at a level just above the highest one"
+        f"above {path.points[path.counted - 1].level:.6g} m points of the crack close again and "
+        "part its water from the reservoir: the equilibria beyond it have less uplift than an "
+        "open crack, and no path leads on at a level just above the highest one"
     )
 
 

@@ -16,7 +16,7 @@ from ..arrays import Array
 from ..input.case import Case
 from ..joint.interface import Interface
 from ..model.loads import Loading
-from ..model.results import HISTORY, Columns, column_of, with_all_joints
+from ..model.results import HISTORY, Columns, with_all_joints
 from ..solver.controls import LevelControl
 from ..solver.history import JointState
 from ..solver.load_stepper import SAME_TIME, LoadStepper
@@ -248,8 +248,8 @@ class FailurePath(EquilibriumPath):
 
     @property
     def admissible(self) -> list[Point]:
-        """The points before the toe is crushed."""
-        return self.points[:-1] if self.crushed else self.points
+        """The points before the toe is crushed or the water withdraws."""
+        return self.points[: min(self.counted, len(self.points) - self.crushed)]
 
     @property
     def crushed_at_top(self) -> bool:
@@ -310,15 +310,24 @@ class FailurePath(EquilibriumPath):
     @property
     def water_withdraws(self) -> bool:
         """Whether the water leaves the crack under a higher level: single points that close again
-        part it from the reservoir. From there on the uplift is less than that of an open crack.
+        part it from the reservoir. From there on the uplift is less than that of an open crack, and
+        the levels do not count.
         """
+        return self.counted < len(self.points)
+
+    @property
+    def counted(self) -> int:
+        """The number of points up to the largest uplift, if the water withdraws after it."""
+        number = len(self.points)
         if not self.entering or not self.points:
-            return False
-        rows = self.points[-1].history.rows
-        level = np.array(rows["level"])
-        uplifts = (np.array(rows[column_of("U", k)]) for k in range(len(self.case.joints)))
-        lower = level < level[-1]
-        return any(U[-1] < (1 - WITHDRAWN) * U[lower].max(initial=0.0) for U in uplifts)
+            return number
+        uplifts = np.array([point.uplifts for point in self.points])
+        lower = np.array([point.level for point in self.points]) < self.points[-1].level
+        largest = uplifts[lower].max(axis=0, initial=0.0)
+        for joint in np.flatnonzero(uplifts[-1] < (1 - WITHDRAWN) * largest):
+            full = lower & (uplifts[:, joint] == largest[joint])
+            number = min(number, int(np.argmax(full)) + 1)
+        return number
 
     @property
     def grows(self) -> bool:
