@@ -613,7 +613,9 @@ class EquilibriumPath:
         order = sorted(lengths, key=lambda kind: backwards and kind == "crest")
         tried = [(kind, part * lengths[kind]) for kind in order for part in PARTS]
         for kind, by in [*tried, *(("crest", part * far) for part in JUMPS)]:
-            beyond = by and self.step(last, last.further(controls[kind], by), by, kind)
+            if abs(by) <= LEAST * far:  # it would lead to the same point
+                continue
+            beyond = self.step(last, last.further(controls[kind], by), by, kind)
             if beyond:
                 return beyond
         return None
