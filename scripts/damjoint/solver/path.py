@@ -109,6 +109,10 @@ CRAWL = 1e-5
 #: Number of short ones, one after the other.
 MOST_SHORT = 40
 
+#: The end of a branch is sought until a short increment would raise the level, by the slope before,
+#: by less than this, over the level [-].
+NEGLIGIBLE_RISE = 1e-6
+
 # Increments where a branch ends, or falls
 
 #: Relative rise of the level that they aim at [-].
@@ -578,7 +582,7 @@ class EquilibriumPath:
         while part > (SHORTENED if last.slipping is not None else SMALLEST):
             for kind, control in last.controls.items():
                 by = part * self.increment(control)
-                if abs(by) < LEAST * self.imposed(last):
+                if abs(by) < max(LEAST * self.imposed(last), self.negligible(last, control)):
                     continue
                 if new := self.along(last, control, by, SHORTENED * abs(by), kind):
                     reached = new[-1].imposed - self.imposed(last)
@@ -588,6 +592,17 @@ class EquilibriumPath:
                     return True
             part *= SHORTENED
         return False
+
+    def negligible(self, point: Point, control: DisplacementControl) -> float:
+        """The increment from a point [m] up to which the branch ends there, to the precision: it is
+        short, and the level would rise little if it went on as in the last one.
+        """
+        before, moved = point.state.previous, abs(point.moved(control))
+        if before is None or not before.pressures:
+            return 0.0
+        rise = abs(point.level - before.loading.level)
+        short = CRAWL * self.imposed(point)
+        return min(short, NEGLIGIBLE_RISE * point.level * moved / rise) if rise else short
 
     def pass_over(self, last: Point) -> None:
         """Append an equilibrium beyond a point, whether of its branch or not."""
@@ -684,7 +699,7 @@ class EquilibriumPath:
                 moved = np.abs(end.state.jump - point.state.jump).max()
                 if moved < SHORT * self.imposed(point) or self.straight(point, middle, end):
                     return [middle, end]
-            whole, by = middle, by / 2
+            whole, by = middle, by / 2 * (SHRINKING if middle is None else 1)
         return []
 
     def predicted(self, begin: Point, end: Point) -> bool:
@@ -858,7 +873,10 @@ class EquilibriumPath:
         a, b = self.points[left : left + 2]
         control = a.towards(b.state.jump - a.state.jump)
         length = self.length(left) / 2
-        return self.along(a, control, length, SMALLEST * length, b.control) if control else []
+        if control is None:
+            return []
+        smallest = max(SMALLEST * length, self.negligible(a, control))
+        return self.along(a, control, length, smallest, b.control)
 
 
 def deviation(change: float, predicted: float, least: float) -> float:
