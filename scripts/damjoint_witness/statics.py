@@ -22,7 +22,7 @@ TOLERANCE, OF_RESIDUAL = 1e-7, 10.0
 #: Zangar's largest pressure coefficient, by the face's angle from the vertical [degrees].
 ZANGAR = {0: 0.735, 10: 0.67, 20: 0.62, 30: 0.55, 40: 0.48, 50: 0.4, 60: 0.31, 70: 0.225, 80: 0.125}
 #: Values of added_mass.
-WESTERGAARD, WITH_ZANGAR = 1, 2
+WESTERGAARD = 1
 #: Points of a quadrature on (0, 1).
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
 

@@ -101,7 +101,8 @@ def test_limits():
 
 
 def test_both_signs():
-    plan = in_both_signs(Plan({"record_scale": [1.0, -2.0, 2.0]}, {}, {}))
+    plan = in_both_signs(Plan({"record_scale": [1.0, -2.0, 2.0]}, {}, {}), 3.0)
     assert plan.varied == {"record_scale": [1.0, 2.0, -1.0, -2.0]}
     with pytest.raises(InputError, match="--both-signs: must not be given with a sampled"):
-        in_both_signs(Plan({}, {"record_scale": [1.0]}, {}))
+        in_both_signs(Plan({}, {"record_scale": [1.0]}, {}), 3.0)
+    assert in_both_signs(Plan({}, {}, {}), -3.0).varied == {"record_scale": [3.0, -3.0]}

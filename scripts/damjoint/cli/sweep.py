@@ -123,15 +123,11 @@ def call(arguments: argparse.Namespace) -> int:
     motions: dict[str, list[Value]] = {}
     if arguments.record:
         motions[MOTION] = [str(file) for file in arguments.record]
-    if arguments.both_signs and not any(v.startswith("record_scale=") for v in arguments.vary):
-        motions["record_scale"] = [1.0]  # in place of that of the case
-    plan = plan_of(arguments.vary, arguments.tie, sample, settings, arguments.critical, motions)
+    given = arguments.vary, arguments.tie, sample, settings, arguments.critical, motions
+    plan = plan_of(*given, signs=arguments.both_signs)
     case = load_case(arguments, arguments.case)
     if arguments.both_signs:
-        if "record_scale" in motions:
-            motions["record_scale"] = [case["record_scale"]]
-            plan = dataclasses.replace(plan, varied={**plan.varied, **motions})
-        plan = in_both_signs(plan)
+        plan = in_both_signs(plan, float(case["record_scale"]))
     plan = dataclasses.replace(plan, quake=limits)
     if case.accuracy:
         case, estimate = meshed(case)

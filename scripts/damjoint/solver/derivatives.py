@@ -291,8 +291,8 @@ class Differentiation:
         same = key_of(other) == self.key
         return Model(other, self.model.equilibrium.interface if same else None)
 
-    def along(self, updates: Sequence[Trace]) -> list[dict[str, Derivative]]:
-        """The derivatives of each state of a path, by parameter.
+    def along(self, updates: Sequence[Trace]) -> tuple[list[dict[str, Derivative]], float]:
+        """The derivatives of each state of a path, by parameter, and its `level_rise` at the end.
 
         Raises RunError if one of them was reached by relaxation with frozen damage.
         """
@@ -303,28 +303,30 @@ class Differentiation:
                     f"sensitivity: the crack has grown unstably at level "
                     f"{update.state.loading.level:.6g} m; the state after it has no derivative"
                 )
-            self.step(state, update)
+            linear = self.step(state, update)
             state = update.state
             at_rest = state.time == 0 and bool(self.model.case["weight_first"])
             results.append({n: p.end(state, at_rest) for n, p in self.parameters.items()})
-        return results
+        return results, self.level_rise(updates, linear) if updates else math.inf
 
-    def level_rise(self, updates: Sequence[Trace]) -> float:
-        """How much the level still rises with the displacement prescribed at the end of a path that
-        has been followed, over its mean rise on the path [-]: about 1 as long as all is elastic, 0
-        at a limit point; inf without a prescribed displacement.
+    def level_rise(self, updates: Sequence[Trace], linear: Linearised) -> float:
+        """How much the level still rises with the displacement prescribed at the end of a path,
+        where its equation is linearised, over its mean rise on the path [-]: about 1 as long as
+        all is elastic, 0 at a limit point; inf without a prescribed displacement.
         """
         first, last = updates[0].state, updates[-1]
-        if self.linear.border is None or not isinstance(last.control, DisplacementControl):
+        if linear.border is None or not isinstance(last.control, DisplacementControl):
             return math.inf
         measure = partial(self.model.measure, last.control)
         moved, risen = measure(last.state) - measure(first), last.state.loading.level
-        size = len(self.linear.border.row)
-        _, (rate,) = self.linear.solve(np.zeros((size, 1)), np.ones(1))
+        size = len(linear.border.row)
+        _, (rate,) = linear.solve(np.zeros((size, 1)), np.ones(1))
         return float(rate * moved / risen) if risen else math.inf
 
-    def step(self, state: State, update: Trace) -> None:
-        """Solve for the rates of all parameters at the end of a step from a state."""
+    def step(self, state: State, update: Trace) -> Linearised:
+        """Solve for the rates of all parameters at the end of a step from a state; its equation,
+        linearised there.
+        """
         end = update.state
         control = update.control if isinstance(update.control, DisplacementControl) else None
         problem, border = self.model.begin(state, end.time).problem, None
@@ -333,7 +335,7 @@ class Differentiation:
         if control:
             given = Prescribed(control, self.model.equilibrium)
             border = Border(here.by_unknown(unknown), given.row, given.rate(end.loading), 0.0)
-        self.linear = linear = Linearised(problem, here.by_jump(False), border)
+        linear = Linearised(problem, here.by_jump(False), border)
         under_way = [*self.parameters]
         for part in self.parameters.values():
             part.begin(end.time, len(end.jump), unknown)
@@ -346,3 +348,4 @@ class Differentiation:
             under_way = [n for n, p, x, s in pairs if p.add(x, s, number > 0)]
             if not under_way:
                 break
+        return linear

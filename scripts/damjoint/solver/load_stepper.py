@@ -14,7 +14,7 @@ from ..model.loads import Loading, Unknown
 from ..model.results import Results
 from .controls import Control, DissipationControl, LevelControl, drive_of, work_of
 from .history import History
-from .model import Model, StepResult, StepStrategy
+from .model import Model, StepOptions, StepResult
 from .path import PRECISION, ROUGH, SURE, EquilibriumPath, Point
 from .relaxation import over_unstable_growth
 from .state import State, Trace
@@ -254,7 +254,7 @@ class LoadStepper:
             self.state,
             time,
             self.control(time),
-            StepStrategy(
+            StepOptions(
                 strategies[:1] if quick else strategies, extrapolate=True, persist=smallest
             ),
         )
@@ -278,7 +278,7 @@ class LoadStepper:
         step = None
         if self.mechanism is None:
             control, fallback = self.control(target), self.model.strategies[-1:]
-            step = self.model.advance(self.state, target, control, StepStrategy(fallback))
+            step = self.model.advance(self.state, target, control, StepOptions(fallback))
             self.end_of_solution = "" if step else self.model.end_of_solution
         self.stopped = step is None
         return step
@@ -355,8 +355,8 @@ class LoadStepper:
             jump = last.state.jump + share * (jump - last.state.jump)
         strategies = self.model.strategies[:FROM_PATH]
         control = LevelControl(level)
-        attempt = StepStrategy(strategies, guess=(jump, level))
-        step = self.model.advance(last.state, time, control, attempt)
+        options = StepOptions(strategies, guess=(jump, level))
+        step = self.model.advance(last.state, time, control, options)
         if step is None:
             return None
         self.record_limit_points(levels)

@@ -59,10 +59,10 @@ class StepResult:
 
 
 @dataclass(frozen=True)
-class StepStrategy:
+class StepOptions:
     """How a step is solved."""
 
-    #: those of the model by default; the first one that converges ends the attempt
+    #: those of the model by default; they are tried until one converges
     strategies: Sequence[Strategy] | None = None
     #: whether the first one starts from the last two states
     extrapolate: bool = False
@@ -99,20 +99,20 @@ class Begun:
             return problem
         return problem.with_constant_lift(self.constant_lift)
 
-    def solve(self, control: Control, attempt: StepStrategy) -> StepResult | None:
-        """Solve it by the first strategy of an attempt that converges; None if none does."""
-        model, state, time, tried = self.model, self.state, self.time, attempt.strategies
+    def solve(self, control: Control, options: StepOptions) -> StepResult | None:
+        """Solve it by the first strategy that converges; None if none does."""
+        model, state, time, tried = self.model, self.state, self.time, options.strategies
         starts = [
             Start(
                 strategy,
                 *(
-                    attempt.guess
-                    or model.predict(state, time, control, attempt.extrapolate and not n)
+                    options.guess
+                    or model.predict(state, time, control, options.extrapolate and not n)
                 ),
             )
             for n, strategy in enumerate(model.strategies if tried is None else tried)
         ]
-        plan = Plan(starts, model.convergence, attempt.persist)
+        plan = Plan(starts, model.convergence, options.persist)
         constraint = None
         if isinstance(control, DisplacementControl):
             constraint = Prescribed(control, model.equilibrium)
@@ -276,15 +276,15 @@ class Model:
         )
 
     def advance(
-        self, state: State, time: float, control: Control, attempt: StepStrategy | None = None
+        self, state: State, time: float, control: Control, options: StepOptions | None = None
     ) -> StepResult | None:
         """A step from a state to a time; None if no strategy converges."""
-        return self.begin(state, time).solve(control, attempt or StepStrategy())
+        return self.begin(state, time).solve(control, options or StepOptions())
 
     def advance_by_first(self, state: State, time: float, control: Control) -> StepResult | None:
         """A step by the first strategy only, from the extrapolation of the last two states."""
         first = self.strategies[:1]
-        return self.advance(state, time, control, StepStrategy(first, extrapolate=True))
+        return self.advance(state, time, control, StepOptions(first, extrapolate=True))
 
     def predict(
         self, state: State, time: float, control: Control, extrapolate: bool

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from .controls import Control, LevelControl
-from .model import Model, StepResult, StepStrategy
+from .model import Model, StepOptions, StepResult
 from .newton import repeats
 from .state import State
 
@@ -41,14 +41,14 @@ def relax(
         frozen = start.freeze(equilibrium)
         coupled = strategies[:1] if equilibrium.flowing else strategies
         begun = model.begin(start, time, frozen)
-        step = begun.solve(control, StepStrategy(coupled, persist=False))
+        step = begun.solve(control, StepOptions(coupled, persist=False))
         if step is None and equilibrium.flowing:
             level = control.level if isinstance(control, LevelControl) else start.loading.level
             opened = before_quake or start
             water = equilibrium.water_in_step(opened.variables, steps=steps)
             lift = water.flow(opened.jump, model.loading(time, level)).lift
             begun = replace(begun, constant_lift=lift)
-            step = begun.solve(control, StepStrategy(strategies, persist=False))
+            step = begun.solve(control, StepOptions(strategies, persist=False))
         if step is None:
             return None
         iterations += step.iterations
@@ -82,8 +82,8 @@ def over_unstable_growth(
     first, *others = model.strategies
     strategies = [first, *(strategy for strategy in others if strategy.release)]
     guess = relaxed.state.jump, relaxed.state.loading.level
-    attempt = StepStrategy(strategies, persist=False, guess=guess)
-    step = model.advance(begin, time, control, attempt)
+    options = StepOptions(strategies, persist=False, guess=guess)
+    step = model.advance(begin, time, control, options)
     if step:
         return replace(step, iterations=relaxed.iterations + step.iterations), False
     return (relaxed, True) if accept_relaxed and balanced else (None, False)

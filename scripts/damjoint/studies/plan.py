@@ -334,9 +334,11 @@ def plan_of(
     settings: Settings,
     critical: str = "",
     motions: Mapping[str, list[Value]] = MappingProxyType({}),
+    signs: bool = False,
 ) -> Plan:
     """The plan of the texts NAME=VALUES, NAME=EXPRESSION and a sample; settings: parameters that
-    are set for all rows; critical: as in Plan; motions: further values by name, of earthquakes.
+    are set for all rows; critical: as in Plan; motions: further values by name, of earthquakes;
+    signs: whether `in_both_signs` follows.
 
     Raises InputError.
     """
@@ -347,7 +349,7 @@ def plan_of(
         if not expression:
             raise InputError(f"--tie {text}: must be NAME=EXPRESSION, such as adhesion=2e5*mu")
         ties.append((name, expression))
-    return plan_with(axes, ties, sample, settings, critical)
+    return plan_with(axes, ties, sample, settings, critical, signs)
 
 
 def plan_with(
@@ -356,6 +358,7 @@ def plan_with(
     sample: Sample | None,
     settings: Settings,
     critical: str,
+    signs: bool = False,
 ) -> Plan:
     """The plan of checked values by name, expressions by name and a sample; the rest as `plan_of`.
 
@@ -370,7 +373,7 @@ def plan_with(
                 f"{option} {name}: must be given once, and not by --set, --vary, --sample or --tie "
                 "as well"
             )
-    if not axes and not sample:
+    if not (axes or sample or signs):
         raise InputError("--vary, --sample: one must be given, such as --vary mu=0.3:0.8:0.05")
     number = math.prod(len(values) for _, values in axes) * (sample.rows if sample else 1)
     if number > MOST_ROWS:
@@ -381,13 +384,14 @@ def plan_with(
     return Plan(dict(axes), sample.values() if sample else {}, dict(ties), critical, sobol=sobol)
 
 
-def in_both_signs(plan: Plan) -> Plan:
-    """The plan with each record also reversed: record_scale has its values and their negatives.
+def in_both_signs(plan: Plan, scale: float) -> Plan:
+    """The plan with each record also reversed: record_scale has its values, by default the scale of
+    the case, and their negatives.
 
-    Raises InputError if they are not listed.
+    Raises InputError if it is sampled or tied.
     """
-    scales = plan.varied.get("record_scale")
-    if scales is None:
+    scales = plan.varied.get("record_scale", [scale])
+    if "record_scale" in plan.sampled | plan.tied:
         raise InputError("--both-signs: must not be given with a sampled or tied record_scale")
     values = [abs(float(scale)) for scale in scales]
     both: list[Value] = [*dict.fromkeys([*values, *(-value for value in values)])]

@@ -161,7 +161,7 @@ def of_run(case: Case, names: Sequence[str]) -> list[Sensitivity]:
         columns = list(with_all_joints(dict.fromkeys(CONTINUOUS, ("", "")), stepper.case))
         others = [name for name in names if is_of_geometry(stepper.case, name)]
         direct = [name for name in names if name not in others]
-        states = Differentiation(stepper.model, direct).along(updates)
+        states, _ = Differentiation(stepper.model, direct).along(updates)
         ends = [max(i for i, u in enumerate(updates) if u.state.time == time) for time in saved]
         rows = []
         for name in direct:
@@ -234,9 +234,8 @@ def of_point(point: Point, names: Sequence[str]) -> list[Sensitivity]:
         raise RunError("sensitivity: the path was followed without its updates")
     rows = []
     with limited_threads(1):
-        differentiation = Differentiation(point.model, names)
-        ends = differentiation.along(trace.updates)[-1]
-        if abs(differentiation.level_rise(trace.updates)) > LIMIT_POINT:
+        (*_, ends), rise = Differentiation(point.model, names).along(trace.updates)
+        if abs(rise) > LIMIT_POINT:
             raise RunError(
                 "sensitivity: the critical level has no derivative: at its last equilibrium a "
                 "point is about to open, slip or break, or the crack grows unstably; search it "
