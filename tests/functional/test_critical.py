@@ -310,12 +310,13 @@ def test_the_value_without_lasting_tension_is_given_too():
 @pytest.mark.heavy
 def test_a_rigid_block_that_opens_to_its_toe():
     """mu = 3 resists any shear; full head in the crack. The level falls at every element that
-    opens, by more than the precision: it need not be confirmed.
+    opens, by more than the precision: it need not be confirmed. Higher levels, up to 49.9 m, have
+    less uplift than the open crack.
     """
     settings = UNBONDED | {"mu": 3.0, "uplift": "cracked", "n_joint": 40.0}
     _, answer = search_result("dam", settings=settings)
     assert answer.mode == "overturning"
-    assert answer.value == pytest.approx(answer.gravity, rel=0.01)
+    assert answer.value == pytest.approx(answer.gravity, rel=0.003)
 
 
 def test_a_missing_limit_is_reported(command):
