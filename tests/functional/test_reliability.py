@@ -278,6 +278,7 @@ def test_the_picture_has_each_probability_its_interval_and_the_importance():
     assert not figure_of_reliability([none], "dam", []).axes[0].get_lines()
 
 
+@pytest.mark.heavy
 def test_a_level_that_is_not_computed_counts_as_a_failure(command, monkeypatch):
     """And is printed."""
     find = Search.find
@@ -302,15 +303,19 @@ def test_a_level_that_is_not_computed_counts_as_a_failure(command, monkeypatch):
         (["--vary", "law=normal(0,1)"], "--vary law=normal(0,1): must be of a parameter that is"),
         (["--vary", "mu=norma(0,1)"], "--vary mu=norma(0,1): must be a distribution of scipy"),
         (["--vary", "mu=normal(0.5,0.3)"], "truncnorm, uniform or lognorm keep within bounds"),
+        (["--vary", "n_joint=normal(40,2)"], "must be of a parameter that is a real number"),
+        (["--vary", f"mu={MU}", "--tie", "order=1"], "--tie order: must be of a parameter that is"),
         (["--vary", f"mu={MU}", "--vary", f"mu={MU}"], "--vary mu: must be given once"),
         (["--vary", f"mu={MU}", "--tie", "mu=1"], "--tie mu: must not be varied, and not be"),
         (["--vary", f"mu={MU}", "--correlate", "mu,level=0.5"], "two of the sampled names (mu)"),
         (["--vary", f"mu={MU}", "--scheduler", "nowhere"], "--scheduler nowhere: no scheduler"),
     ],
 )
-def test_bad_input_is_one_line(command, words, message):
+def test_bad_input_is_one_line(command, tmp_path, words, message):
+    """And nothing is computed or written."""
     code, out, error = command("reliability", "dam", *SETTINGS, *words)
     assert code == 2 and not out and message in error and len(error.splitlines()) == 1
+    assert not list(tmp_path.iterdir())
 
 
 def test_without_openturns_a_message_names_the_extra(command, monkeypatch, tmp_path):

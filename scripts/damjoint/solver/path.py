@@ -65,6 +65,8 @@ SAME_JUMP = 0.02
 #: Difference of its jumps from those extrapolated from the last increment, over their change [-].
 #: Half of the change would be a path that turns, or leads back.
 PREDICTED = 0.3
+#: Movement of a joint over the largest one below which it counts as that [-].
+LEAST_MOVED = 0.02
 #: The same of the level, over its change [-]: it has no limit point within the increment as long
 #: as it is below 1.
 PREDICTED_LEVEL = 0.5
@@ -364,7 +366,11 @@ class Point:
         ahead = float(moved @ last) / (float(last @ last) or np.inf)
         if before is None or not before.pressures or ahead <= 0:  # the first one has no loads
             return np.inf
-        off = float(np.abs(moved - ahead * last).max() / np.abs(moved).max())
+        joints = self.model.equilibrium.interface.joints
+        parts = [joint.at_points @ np.column_stack([moved, ahead * last]) for joint in joints]
+        sizes = np.array([np.abs(part[:, 0]).max() for part in parts])
+        offs = np.array([np.abs(part[:, 0] - part[:, 1]).max() for part in parts])
+        off = float((offs / np.maximum(sizes, LEAST_MOVED * sizes.max())).max())
         levels = end.level - self.level, ahead * (self.level - before.loading.level)
         errors = [off / PREDICTED, deviation(*levels, 2 * STRAIGHT * highest)]
         if not end.reaches_joint(self):

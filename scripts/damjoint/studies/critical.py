@@ -35,6 +35,7 @@ from .critical_value import CriticalValue
 from .critical_words import (
     beyond_limit,
     by_increments,
+    end_at_drains,
     end_of_branch,
     events_on,
     falls_at_once,
@@ -298,7 +299,10 @@ class Search:
         elif not result.why and path.falls:
             result = replace(result, why=lost_beyond_limit(path), doubt="")
         elif not result.why and path.stops:
-            result = replace(result, why=end_of_branch(path), doubt="")
+            why, doubt = end_of_branch(path), ""
+            if path.loses_drains:
+                why, doubt = "", end_at_drains(path)
+            result = replace(result, why=why, doubt=doubt)
         if path.begun_by_run and point is path.points[0]:
             result = replace(result, why="", doubt=falls_at_once(point))
         if path.water_withdraws:

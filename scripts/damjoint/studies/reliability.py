@@ -61,6 +61,10 @@ DISAGREES = 3.0
 #: Level over the first one, from which a path begins that finds no equilibrium at that [-].
 LOWER = 0.25
 
+#: Standard normal value up to which the values of each parameter must be allowed, so that what a
+#: sample of a thousand takes is refused before the first critical level [-].
+REACH = 3.1
+
 #: Adhesion [Pa] of the joints that cannot fail in the limit state of another one.
 UNBREAKABLE = 1e12
 
@@ -102,7 +106,12 @@ class Variables:
         for name in self.tied:
             if name in self.distributions or name == "level":
                 raise InputError(f"--tie {name}: must not be varied, and not be the level")
-            checked_name(name)
+            check_continuous(f"--tie {name}", name)
+        for name, text in self.distributions.items():
+            if name != "level":
+                check_continuous(f"--vary {name}={text}", name)
+        for end in (-REACH, REACH):
+            self.values([end] * len(self.names))
 
     @property
     def names(self) -> list[str]:
@@ -159,13 +168,13 @@ class Variables:
             ) from None
 
 
-def checked_name(name: str) -> None:
-    """Raise InputError if a name is not of a parameter that is a number."""
+def check_continuous(option: str, name: str) -> None:
+    """Raise InputError if a name, of an option, is not of a parameter that is a real number."""
     from ..input.parameters import parameter
 
     known = parameter(name.rpartition(".")[2])
-    if known.text or known.choices:
-        raise InputError(f"--tie {name}: must be a parameter that is a number")
+    if known.text or known.choices or known.integer:
+        raise InputError(f"{option}: must be of a parameter that is a real number")
 
 
 # -- critical levels

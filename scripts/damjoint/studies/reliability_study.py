@@ -30,6 +30,7 @@ from .reliability import (
     openturns,
 )
 from .result_file import result_file
+from .sweep import client_of
 
 #: Files of the study: the critical levels, and the case of the design point.
 ROWS, DESIGN = "reliability.csv", "design_point.case"
@@ -55,6 +56,8 @@ def reliability(
     openturns()
     check_jobs(jobs)
     variables.normal()
+    if scheduler:
+        client_of(scheduler).close()
     rows, columns = out / ROWS, columns_of(variables)
     with session(case, out, keep=of_same_columns(rows, columns)) as study:
         numeric = [c for c in columns if c in ("critical_level", "confirmed")]

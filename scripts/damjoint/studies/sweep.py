@@ -250,6 +250,22 @@ def spread(
     return spread_bundles(last_rows, bundles(tasks), tasks, jobs, scheduler)
 
 
+def client_of(scheduler: str) -> Any:
+    """A client of dask of a scheduler at an address. Raises InputError."""
+    try:
+        from dask.distributed import Client
+    except ImportError:
+        raise InputError(
+            "--scheduler: needs dask.distributed; pip install 'damjoint[cluster]'"
+        ) from None
+    try:
+        return Client(scheduler, timeout=10)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"--scheduler {scheduler}: no scheduler answers at this address ({error})"
+        ) from None
+
+
 def spread_bundles(
     rows_of: Callable[[list[Any]], list[dict[str, Value]]],
     work: list[list[str]],
@@ -264,19 +280,9 @@ def spread_bundles(
     """
     chosen = [[tasks[key] for key in keys] for keys in work]
     if scheduler:
-        try:
-            from dask.distributed import Client, as_completed
-        except ImportError:
-            raise InputError(
-                "--scheduler: needs dask.distributed; pip install 'damjoint[cluster]'"
-            ) from None
-        try:
-            client = Client(scheduler, timeout=10)
-        except (OSError, ValueError) as error:
-            raise InputError(
-                f"--scheduler {scheduler}: no scheduler answers at this address ({error})"
-            ) from None
-        with client:
+        with client_of(scheduler) as client:
+            from dask.distributed import as_completed
+
             threads = max(sum(client.nthreads().values()), 1)
             size = min(max(len(work) // (TASKS_PER_THREAD * threads), 1), MOST_IN_TASK)
             futures = {}
