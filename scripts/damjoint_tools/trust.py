@@ -43,7 +43,7 @@ COMPARED = (
     (
         "pressure and flux in the joint",
         "the flow through the written openings: resistances in series or a network in 2D, "
-        "finite elements in 3D, with drains and waterstop",
+        "finite elements in 3D, with drains, waterstop, elastic aperture and turbulence",
         "1e-9 of the largest pressure, 1e-6 in 3D",
     ),
     (
