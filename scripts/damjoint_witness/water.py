@@ -613,12 +613,11 @@ class Network:
         share = state.unit_weight * values["rho_water"] / (12 * values["visc"])
         if values["dim"] == 2:
             lengths = 2 * sides.measures
-            conductance = cube @ w / 2 / lengths
             first = sum(len(t) for tables in self.tables[:joint] for t in tables)
             drops = self.flow.drops[first : first + len(table)]
             if values["turbulent"]:
-                conductance = cube * state.slowed(cube, drops / lengths) @ w / 2 / lengths
-            means = share * conductance * drops
+                cube = cube * state.slowed(cube, drops / lengths)
+            means = share * (cube @ w / 2 / lengths) * drops
             order = np.argsort(state.distance(sides.corners.mean(axis=1)))
             leakage = float(means[order[-1]])
         else:

@@ -14,7 +14,6 @@ import gmsh
 import numpy as np
 
 from ..input.case import Case
-from ..input.values import flows_in_time
 from ..model.fields import (
     BROKEN,
     CLOSED,
@@ -210,7 +209,7 @@ def caption(scene: SolvedScene, step: int) -> tuple[str, str, str]:
 def passed(scene: SolvedScene, time: float) -> str:
     """Of a time t, the time that has passed in water that is stored in a joint, in words."""
     case = scene.result.case
-    if not any(map(flows_in_time, case.joints)):
+    if not case.stores_water:
         return ""
     start, last = case["time_start"], case.times[-1]
     name, factor = unit_of_time((last - start) * case["time_unit"])

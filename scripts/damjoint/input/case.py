@@ -28,7 +28,7 @@ from .constraints import (
 from .joint_graph import ROCK, JointGraph
 from .parameters import GEOMETRY_LISTS, constants, declared, independent
 from .source import Source
-from .values import ParameterValues, level_unknown, listed
+from .values import ParameterValues, flows_in_time, level_unknown, listed
 from .values import flows as flows
 from .values import freezes_uplift as freezes_uplift
 from .values import has_drains as has_drains
@@ -209,6 +209,11 @@ class Case(ParameterValues):
         """The bodies and the joints between them."""
         pairs = tuple((joint.lower, joint.upper) for joint in self.of_joints)
         return JointGraph(pairs or ((ROCK, "dam"),))
+
+    @property
+    def stores_water(self) -> bool:
+        """Whether water flows in time in a joint, and is stored there."""
+        return any(map(flows_in_time, self.joints))
 
     def separates(self, numbers: Collection[int]) -> bool:
         """Whether without the joints of these numbers a body has no connection to the rock."""

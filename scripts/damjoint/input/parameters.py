@@ -97,6 +97,11 @@ class Parameter:
     matters: str = ""
 
     @property
+    def real(self) -> bool:
+        """Whether it is a real number: no text, choice or integer."""
+        return not (self.text or self.choices or self.integer)
+
+    @property
     def of_joints(self) -> bool:
         """Whether each joint may have its own value."""
         return self.group == "Joint" or self.name in OF_JOINTS

@@ -263,8 +263,7 @@ class JointWater:
         joints, by the part of it that is this joint's.
         """
         size = self.joint.fields.at_points.T @ self.joint.points.weights
-        flow = self.system.flow
-        share = size / (flow.fields.at_points.T @ flow.points.weights)[self.nodes]
+        share = size / self.system.area[self.nodes]
         parts = {"water": stored.volume, "water_in": stored.inflow, "void": stored.void}
         width, nodes, flux = self.joint.width, pressure.nodes, pressure.flux
         number = 0.0 if flux is None else 2 * np.abs(flux).max() / self.case["visc"]
@@ -524,6 +523,11 @@ class WaterSystem:
         """w^3/(12 visc) of the closed first joint [m3/(Pa s)]."""
         case = self.members[0].case
         return float(case["aperture_min"] ** 3 / (12 * case["visc"]))
+
+    @cached_property
+    def area(self) -> Array:
+        """Area of the joints that each node stands for (n,) [m2; 2D: per metre]."""
+        return np.asarray(self.flow.fields.at_points.T @ self.flow.points.weights)
 
     @property
     def storage(self) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from .. import ROUND_OFF
 from ..arrays import Array, Table
 from ..input.case import Case
-from ..input.values import flows_in_time, has_point, level_unknown
+from ..input.values import has_point, level_unknown
 
 #: Columns of joint.csv: a row per joint node and requested level.
 JOINT = {
@@ -156,7 +156,7 @@ def of_control(case: Case) -> list[str]:
 def history_columns(case: Case) -> Columns:
     """The columns of a case's history.csv: unit and meaning."""
     further = LATERAL if case["dim"] == 3 else {}
-    in_time = IN_TIME if any(map(flows_in_time, case.joints)) else {}
+    in_time = IN_TIME if case.stores_water else {}
     of_point = {n: column for n, column in OF_POINT.items() if n in of_control(case)}
     return with_all_joints(HISTORY | further | in_time | of_point, case)
 
@@ -313,7 +313,7 @@ def joint_columns(case: Case) -> Columns:
     flow = FLUX if any(joint["uplift"] == "flow" for joint in case.joints) else {}
     worked = any(joint["grout_pressure"] or joint["saw_thickness"] for joint in case.joints)
     works = THICKNESS if worked else {}
-    film = FILM if any(map(flows_in_time, case.joints)) else {}
+    film = FILM if case.stores_water else {}
     return functools.reduce(operator.or_, [JOINT, *of_laws, flow, film, works])
 
 

@@ -131,7 +131,7 @@ def half_difference(case: Case, name: str) -> tuple[float, float, float]:
     """
     joint, _, of_joint = name.rpartition(".")
     known = parameter(of_joint)
-    if known.text or known.choices or known.integer or known.group in NOT_CONTINUOUS:
+    if not known.real or known.group in NOT_CONTINUOUS:
         raise InputError(
             f"--sensitivity {name}: must be a parameter that is a number, and neither of geometry, "
             "mesh nor solver"

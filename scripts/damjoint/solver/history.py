@@ -171,9 +171,7 @@ class JointState:
         of_system = stored[flowing.index(water.system)]
         share = np.minimum(of_system.void / water.system.volume(self.state.jump), 1)
         number = 2 * np.abs(node_means(joint, self.pressure.flux)) / water.case["visc"]
-        flow = water.system.flow
-        area = flow.fields.at_points.T @ flow.points.weights
-        mass = water.case["rho_water"] * of_system.volume / area
+        mass = water.case["rho_water"] * of_system.volume / water.system.area
         at_nodes = joint.fields.at_locations @ np.column_stack([share, mass])[water.nodes]
         columns = at_nodes[:, 0], number, at_nodes[:, 1]
         return dict(zip(FILM, columns, strict=True))

@@ -14,7 +14,7 @@ import numpy as np
 from .. import RunError
 from ..arrays import Array
 from ..input.case import Case
-from ..input.values import flows_in_time, freezes_uplift
+from ..input.values import freezes_uplift
 from ..joint.equilibrium import Equilibrium
 from ..joint.flow_in_time import TimeStep
 from ..joint.interface import Interface, interface_of
@@ -227,7 +227,7 @@ class Model:
     @property
     def in_time(self) -> bool:
         """Whether water that flows is stored in the joints."""
-        return bool(self.equilibrium.flowing) and any(map(flows_in_time, self.case.joints))
+        return bool(self.equilibrium.flowing) and self.case.stores_water
 
     def water_steps(self, state: State, time: float) -> tuple[TimeStep, ...]:
         """The steps of what is stored in the joints from a state to a time; empty if the flow is

@@ -65,11 +65,11 @@ SAME_JUMP = 0.02
 #: Difference of its jumps from those extrapolated from the last increment, over their change [-].
 #: Half of the change would be a path that turns, or leads back.
 PREDICTED = 0.3
-#: Movement of a joint over the largest one below which it counts as that [-].
-LEAST_MOVED = 0.02
 #: The same of the level, over its change [-]: it has no limit point within the increment as long
 #: as it is below 1.
 PREDICTED_LEVEL = 0.5
+#: Movement of a joint over the largest one below which it counts as that [-].
+LEAST_MOVED = 0.02
 #: Part of the largest length at which the predictor's error is allowed that is tried next [-].
 SAFETY = 0.8
 

@@ -64,19 +64,15 @@ def shear(case: Case) -> Zone | None:
     return zone(case, "G_t", "adhesion", "9 pi/32 E' G_t/c^2")
 
 
-def formed(results: Results) -> Iterator[Zone]:
-    """Yield the zones of the only joint of these results: of tension where it has opened beyond the
-    strength f_t/K_N, of shear where it has slipped by more than an element beyond the crack.
+def too_short(results: Results) -> Iterator[Zone]:
+    """Yield the zones of the only joint of these results with fewer than `LEAST` elements: of
+    tension where it has opened beyond the strength f_t/K_N, of shear where it has slipped by more
+    than an element beyond the crack.
     """
     case, history = results.case, results.history
     element = case.joint_length / case["n_joint"]
     opened = history["max_opening"].max(initial=0.0) > case["sigma_max"] / case["K_N"]
     slipped = (history["slip_length"] - history["crack_length"]).max(initial=0.0) > element
-    for found, has_formed in ((tension(case), opened), (shear(case), slipped)):
-        if found and has_formed:
-            yield found
-
-
-def too_short(results: Results) -> Iterator[Zone]:
-    """Yield the zones of the only joint of these results with fewer than `LEAST` elements."""
-    yield from (found for found in formed(results) if found.elements < LEAST)
+    for ahead, has_formed in ((tension(case), opened), (shear(case), slipped)):
+        if ahead and has_formed and ahead.elements < LEAST:
+            yield ahead

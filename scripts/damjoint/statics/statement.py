@@ -17,7 +17,6 @@ from .verdict import (
     Bound,
     bound,
     failure,
-    impossible_at_first,
     slipped_from,
     stiffness_ratio,
     verdict,
@@ -29,7 +28,7 @@ def statement(results: Results) -> str:
     case, last, why = results.case, results.last, failure(results)
     mode, joint = why.mode, why.at(case)
     if not last:
-        return reason_at_first(results)
+        return reason_at_first(results, mode)
     if results.stopped:
         where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
         if mode == "out of range":
@@ -53,10 +52,10 @@ def statement(results: Results) -> str:
     )
 
 
-def reason_at_first(results: Results) -> str:
-    """Why a run has no step at all: by statics, or because none has converged."""
-    mode, level, _ = impossible_at_first(results.case)
-    if mode:
+def reason_at_first(results: Results, mode: str) -> str:
+    """Why a run has no step at all: by statics, or because none has converged; mode: of failure."""
+    if mode in REASONS:
+        level = results.case.level_at(results.case.times[0])
         return f"{verdict(results)}: no equilibrium at level {level:.6g} m: {REASONS[mode]}"
     end = results.info.get("end_of_solution")
     return (

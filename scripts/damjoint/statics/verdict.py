@@ -64,8 +64,7 @@ def verdict(results: Results) -> str:
 def failure(results: Results) -> Failure:
     """How the dam fails; a mode without joints if it is not known where."""
     if not results.last:
-        mode, _, joint = impossible_at_first(results.case)
-        return Failure(mode or "not converged", joint)
+        return why_at_first(results.case)
     if results.stopped:
         return why_stopped(results)
     slipped = slipped_joints(results)
@@ -316,9 +315,9 @@ def highest_on_joint(case: Case, last: dict[str, float]) -> tuple[float, str]:
     return min(bounds)
 
 
-def impossible_at_first(case: Case) -> tuple[str, float, tuple[int, ...]]:
-    """How the dam fails at the first time of a case, by the `reserves` of its joints without a
-    crack, the level there [m], and the joint; an empty mode if statics does not show that it fails.
+def why_at_first(case: Case) -> Failure:
+    """How a dam without any step fails at the first time of its case, by the `reserves` of its
+    joints without a crack; not converged if statics does not show that it fails.
     """
     time = case.times[0]
     level = case.level_at(time)
@@ -328,8 +327,8 @@ def impossible_at_first(case: Case) -> tuple[str, float, tuple[int, ...]]:
                 block = gravity.with_crack(joint, time, level, 0.0)
                 for mode, reserve in reserves(joint, block).items():
                     if reserve < 0:
-                        return mode, level, (k,)
-    return "", level, ()
+                        return Failure(mode, (k,))
+    return Failure("not converged")
 
 
 def mean_along(s: Array, values: Array) -> float:

@@ -116,7 +116,7 @@ def free(case: Case, name: str, limits: str | None) -> Free:
     """A free parameter; limits: LOW:HIGH, a prior, or None. Raises InputError."""
     declared = parameters.parameter(name)
     text = f"--free {name}" + (f"={limits}" if limits is not None else "")
-    if declared.text or declared.choices or declared.integer:
+    if not declared.real:
         raise InputError(f"{text}: must be of a parameter that is a real number")
     start = float(case[name])
     low, high, prior = declared.minimum, declared.maximum, None

@@ -21,7 +21,6 @@ from ..arrays import Setting
 from ..input.case import Case
 from ..input.parameters import independent, parameter
 from ..input.resolve import resolve, varied
-from ..input.values import flows_in_time
 from ..joint.interface import interface_of
 from ..model.results import Results, row_of_joint
 from ..session import end_of
@@ -131,7 +130,7 @@ class Search:
     def check_quantity(self) -> None:
         """Raise InputError if the case has nothing to vary."""
         case = self.case
-        if any(map(flows_in_time, case.joints)):
+        if case.stores_water:
             raise InputError(
                 f"time_unit = {case['time_unit']:g}: must be 0 in the search of a critical value, "
                 "whose levels have no time"
@@ -145,7 +144,7 @@ class Search:
         if self.of in ("level", "strength"):
             return
         varied = parameter(self.name)
-        if varied.text or varied.choices or varied.integer or varied.group == "Solver":
+        if not varied.real or varied.group == "Solver":
             raise InputError(
                 f"--of {self.of}: must be level, strength, uplift or a parameter that is a number "
                 "without steps"
@@ -298,11 +297,10 @@ class Search:
             result = replace(result, mode="sliding", why=slips_whole(path), doubt="")
         elif not result.why and path.falls:
             result = replace(result, why=lost_beyond_limit(path), doubt="")
+        elif not result.why and path.stops and path.loses_drains:
+            result = replace(result, doubt=end_at_drains(path))
         elif not result.why and path.stops:
-            why, doubt = end_of_branch(path), ""
-            if path.loses_drains:
-                why, doubt = "", end_at_drains(path)
-            result = replace(result, why=why, doubt=doubt)
+            result = replace(result, why=end_of_branch(path), doubt="")
         if path.begun_by_run and point is path.points[0]:
             result = replace(result, why="", doubt=falls_at_once(point))
         if path.water_withdraws:

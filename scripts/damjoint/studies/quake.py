@@ -24,7 +24,6 @@ from ..engines.condensed.solve import about
 from ..fem.bodies import Bodies
 from ..fem.factor import single_thread
 from ..input.case import Case
-from ..input.values import flows_in_time
 from ..joint.interface import interface_of
 from ..model.fields import Field
 from ..model.results import column_of
@@ -79,7 +78,7 @@ def check(case: Case, span: Span = None) -> None:
             "storage = 0: must be > 0 with quake_uplift = transient, else the pressure would leap "
             "as a point opens (water alone: aperture / 2.2 GPa; 1e-12 m/Pa with a little air)"
         )
-    if mode == "crack" and any(map(flows_in_time, case.joints)):
+    if mode == "crack" and case.stores_water:
         raise InputError(
             f"quake_uplift = crack: must be transient, unchanged or zero with time_unit = "
             f"{case['time_unit']:g} (its flow is steady)"

@@ -172,8 +172,7 @@ def check_continuous(option: str, name: str) -> None:
     """Raise InputError if a name, of an option, is not of a parameter that is a real number."""
     from ..input.parameters import parameter
 
-    known = parameter(name.rpartition(".")[2])
-    if known.text or known.choices or known.integer:
+    if not parameter(name.rpartition(".")[2]).real:
         raise InputError(f"{option}: must be of a parameter that is a real number")
 
 

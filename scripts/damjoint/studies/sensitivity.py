@@ -122,7 +122,7 @@ def names_of(case: Case, text: str, geometry: bool = False) -> list[str]:
 def is_of_geometry(case: Case, name: str) -> bool:
     """Whether derivatives with a parameter are those of two runs."""
     known = None if "." in name else parameter(name)
-    if not known or known.group != "Geometry" or known.text or known.choices or known.integer:
+    if not known or known.group != "Geometry" or not known.real:
         return False
     return not case.geometry and isinstance(case[name], float) and case[name] != 0
 
@@ -131,7 +131,7 @@ def all_of(case: Case) -> list[str]:
     """The parameters of a case with a derivative and an effect; of each joint where they differ."""
     names = []
     for name, known in declared().items():
-        if known.text or known.choices or known.integer or known.group in NOT_CONTINUOUS:
+        if not known.real or known.group in NOT_CONTINUOUS:
             continue
         if known.group in WITHOUT_EFFECT and name not in BUT:
             continue

@@ -19,7 +19,6 @@ from ... import InputError, RunError, data
 from ...input.case import Case
 from ...input.parameters import assignments, constants, declared, listing, quoted
 from ...input.scene import LINES, SIDES, TRACTION
-from ...input.values import flows_in_time
 from ...mesh.chord import Chord
 from ...mesh.joint_mesh import heel_normal
 from ...mesh.mesh import Mesh
@@ -304,7 +303,7 @@ class Runner:
             {
                 "views": 0.0,
                 "fields": float(fields),
-                "node_points": float(any(map(flows_in_time, case.joints))),
+                "node_points": float(case.stores_water),
             },
         )
         steps, of_joints = [], []

@@ -137,7 +137,7 @@ def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
     meshed = time.perf_counter() - start
     with tempfile.TemporaryDirectory(prefix="damjoint-") as name, ThreadPoolExecutor(2) as pool:
         mesh_file = Path(name) / "scene.msh"
-        mesh.write(mesh_file, node_points=any(map(flows_in_time, case.joints)))
+        mesh.write(mesh_file, node_points=case.stores_water)
         case = case.with_joints([joint.of_case for joint in mesh.joints])
         if case.geometry:
             case = with_paths(case, mesh.joints)

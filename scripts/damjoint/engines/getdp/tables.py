@@ -86,7 +86,7 @@ def read_history(case: Case, folder: Path) -> dict[str, np.ndarray]:
         rows = of_joints[k::number][: len(steps)]
         names = [column_of(name, k) for name in PRINTED_OF_JOINTS]
         printed |= dict(zip(names, rows.T, strict=True))
-    if any(map(flows_in_time, case.joints)):
+    if case.stores_water:
         of_water = complete_rows(folder / "water.txt", PRINTED_OF_WATER)
         for k, joint in enumerate(case.joints):
             rows = of_water[k::number][: len(steps)]
