@@ -28,6 +28,8 @@ from .solids import SHAPES, Array, IntArray, Sides, corners_of, functions, rule
 #: Error of a pressure over the largest one, and of a flux over its scale: they are written with 12
 #: digits. In 3D, of a system of equations.
 DIGITS, IN_3D = 1e-9, 1e-6
+#: Last digits of the heads by which a flux may differ: those of two solutions.
+HEAD_DIGITS = 10
 #: Places of nodes have 9 decimals [m].
 SAME_PLACE = 1e-7
 #: Times that differ by less are the same.
@@ -601,10 +603,11 @@ class Network:
 
         return at
 
-    def flux(self, joint: int) -> tuple[Array, float, float]:
+    def flux(self, joint: int) -> tuple[Array, float, float, float]:
         """Return the flux towards the toe [kg/(m s)] at the rows of a joint, mean of the elements
-        around them, that out of the toe per metre of thickness, and its scale: that of the aperture
-        under the steepest head.
+        around them, that out of the toe per metre of thickness; its scale, that of the aperture
+        under the steepest head; and the flux by which the last digits of the heads change it where
+        the joint is widest.
         """
         state, values = self.joints[joint], self.joints[joint].values
         (sides,), (table,), (factor,) = state.sides, self.tables[joint], self.widening[joint]
@@ -613,6 +616,7 @@ class Network:
         share = state.unit_weight * values["rho_water"] / (12 * values["visc"])
         if values["dim"] == 2:
             lengths = 2 * sides.measures
+            steepest = 1 / lengths.min()
             first = sum(len(t) for tables in self.tables[:joint] for t in tables)
             drops = self.flow.drops[first : first + len(table)]
             if values["turbulent"]:
@@ -621,14 +625,16 @@ class Network:
             order = np.argsort(state.distance(sides.corners.mean(axis=1)))
             leakage = float(means[order[-1]])
         else:
-            slopes = np.einsum("mqax,ma->mqx", gradients(sides, u), self.heads[table])
+            of_functions = gradients(sides, u)
+            steepest = np.abs(of_functions).max()
+            slopes = np.einsum("mqax,ma->mqx", of_functions, self.heads[table])
             along = slopes[..., :2] @ state.along
             means = -share * (cube * along) @ w / w.sum()
             own = self.nodes_of(joint)
             along_joint = state.rows["s"][state.find(self.nodes[own])]
             toe = own[along_joint.max() - along_joint < SAME_PLACE]
             at_toe = np.isin(np.arange(len(self.nodes)), toe).astype(float)[table]
-            tested = np.einsum("mqax,ma->mqx", gradients(sides, u), at_toe)
+            tested = np.einsum("mqax,ma->mqx", of_functions, at_toe)
             products = np.einsum("mqx,mqx->mq", slopes, tested) * cube
             leakage = float(-share * np.sum(products @ w * sides.measures))
             leakage /= float(np.ptp(self.nodes[:, 2]))
@@ -638,7 +644,13 @@ class Network:
         np.add.at(count, rows, 1)
         heads = np.ptp(self.heads) + max(state.level, 0) * 1e-3
         scale = max(float(np.abs(means).max()), share * values["aperture_min"] ** 3 * heads)
-        return total / np.maximum(count, 1), leakage, scale
+        digits = np.finfo(float).eps * np.abs(self.heads).max()
+        return (
+            total / np.maximum(count, 1),
+            leakage,
+            scale,
+            float(share * cube.max() * steepest * digits),
+        )
 
 
 #: Water that enters at an exit, over the most at a node, up to which it counts as rounding.
@@ -817,11 +829,11 @@ def flux(files: Files, network: Network, joint: int, room: float) -> Iterator[st
     """Yield where the flux in the tables of a joint differs."""
     state = network.joints[joint]
     time, history = state.rows["time"][0], files.history_of(state.number)
-    means, leakage, scale = network.flux(joint)
+    means, leakage, scale, by_digits = network.flux(joint)
     written = float(history["flux"][np.argmin(np.abs(history["time"] - time))])
     for what, error in (
         ("flux", np.abs(state.rows["flux"] - means).max()),
         ("leakage", abs(written - leakage)),
     ):
-        if error > room * scale:
+        if error > max(room * scale, HEAD_DIGITS * by_digits):
             yield f"joint {state.number + 1}: {what} off by {error:.3g} kg/(m s) at t = {time:g}"

@@ -40,6 +40,22 @@ def test_stiff_friction_without_hardening(solve, overrides):
     assert not result.stopped and result.last["level"] == 1.5
 
 
+#: A random dam of the verification: sawn by 90 um while its contact is compressed by 1 nm.
+SAWN = {"dam_height": 8.54, "dam_base": 7.34, "dam_crest": 0.716, "E": 3.22e12, "nu": 0.0523}
+SAWN |= {"law": "rupture", "K_N": 1.01e14, "K_T": 4.96e13, "sigma_max": 0.0, "alpha": 1}
+SAWN |= {"pena_rupture": 1.86, "saw_thickness": 9.23e-5, "saw_t": 2, "n_joint": 40, "order": 1}
+
+
+@pytest.mark.parametrize("steps", [1, 2, 3, 8])
+def test_a_sawn_joint_closes_in_any_number_of_steps(solve, steps):
+    """It was "not converged" with 1 to 4 and with 20 steps: the whole joint was open at first."""
+    (result,) = solve("dam", "4.94,9.29", **SAWN, tail_levels="1.47", steps=steps)
+    assert not result.stopped
+    assert not result.history["cuts"].any()
+    closure = result.joint["delta_n"][-41:]
+    assert closure.min() == pytest.approx(-9.23e-5, rel=1e-3)
+
+
 def test_secant_of_friction_is_stress_over_jump():
     law = load("ssnp142", {"law": "friction", "K_T": 9e14}).law
     rng = np.random.default_rng(1)

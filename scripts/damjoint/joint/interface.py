@@ -112,6 +112,13 @@ class JointInterface:
         """delta_n, delta_t1, delta_t2 (q, 3) by at_points or at_nodes."""
         return jumps_from(matrix, unknowns, self.dim)
 
+    @cached_property
+    def unit_opening(self) -> Array:
+        """Unknowns (j,) of an opening of 1 m along the whole joint; nearly, where joints meet."""
+        normal = self.points.weights @ self.frames[self.points.elements, 0]
+        normal /= np.linalg.norm(normal)
+        return self.unknowns.T @ np.tile(normal[: self.dim], len(self.space.locations))
+
     def extrapolate(self, values: Array) -> Array:
         """Values (corners, n) at the corner nodes from values (q, n) at the Gauss points: a linear
         function of each element, mean over the elements around a node.

@@ -65,6 +65,11 @@ class JointLaws:
         parts = self._each(Law.update_internal_variables, jump, variables)
         return JointVariables(tuple(parts), variables.starts)
 
+    def mean_thickness(self, variables: JointVariables) -> Array:
+        """Mean over each joint of its `Law.added_thickness` (joints,) [m]."""
+        parts = zip(self.laws, variables.joints, np.diff(variables.starts), strict=True)
+        return np.array([law.added_thickness(state, int(n)).mean() for law, state, n in parts])
+
     def _each(
         self, method: Callable[..., Any], jump: Array, variables: JointVariables
     ) -> list[Any]:

@@ -105,10 +105,7 @@ class Begun:
         starts = [
             Start(
                 strategy,
-                *(
-                    options.guess
-                    or model.predict(state, time, control, options.extrapolate and not n)
-                ),
+                *(options.guess or self.predict(control, options.extrapolate and not n)),
             )
             for n, strategy in enumerate(model.strategies if tried is None else tried)
         ]
@@ -129,6 +126,23 @@ class Begun:
         residual = solution.size / (model.reference or 1.0)
         new = new.after(state).traced(state, self.frozen, control)
         return StepResult(new, solution.iterations, residual, solution.criterion)
+
+    @cached_property
+    def closing(self) -> Array | None:
+        """Jump (j,) by which each joint closes over what the saw takes off in the step, if it does:
+        from the last state the whole joint would be open.
+        """
+        laws, joints = self.model.equilibrium.laws, self.model.equilibrium.interface.joints
+        now, new = (laws.mean_thickness(s.variables) for s in (self.state, self.start))
+        if not (new - now).any():
+            return None
+        return sum(d * joint.unit_opening for d, joint in zip(new - now, joints, strict=True))
+
+    def predict(self, control: Control, extrapolate: bool) -> tuple[Array, float]:
+        """See `Model.predict`; a joint that is sawn closes."""
+        extrapolate &= self.closing is None
+        jump, level = self.model.predict(self.state, self.time, control, extrapolate)
+        return jump if self.closing is None else jump + self.closing, level
 
     def end(self, jump: Array, loading: Loading) -> State:
         """The state at its end, with a jump (j,)."""
