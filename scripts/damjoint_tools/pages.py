@@ -239,7 +239,7 @@ def validation_pages() -> None:
         "# SSNP142: computed and published values",
         SSNP142,
         source,
-        report(rows["ssnp142"], "github", notes=True),
+        report(rows["ssnp142"], "github"),
         FACES,
         face_integrations([c for c in rows["ssnp142"] if c.reference.modeling in ON_FILES]),
         "![Modeling K: past the critical load](pictures/k_curve.png)",
@@ -249,7 +249,7 @@ def validation_pages() -> None:
     for family, shows in FAMILIES.items():
         if family != "ssnp142":
             others += [f"## {family.upper()}", f"{shows[0].upper()}{shows[1:]}."]
-            others += [report(rows[family], "github", notes=True)]
+            others += [report(rows[family], "github")]
         if family == "sdnv138":
             others += [QUAKES, quake_conventions(rows[family])]
     others.append(icold_section())

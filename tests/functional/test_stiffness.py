@@ -40,6 +40,17 @@ def test_the_command_prints_a_row_for_each_joint_and_what_is_refused(command):
     assert "K_T / 10: G_t = 100: must be > 200 N/m" in out
 
 
+def test_a_parameter_without_effect_is_named(command):
+    """With law rupture no friction acts; N does not depend on K_N, which leaves round-off in it."""
+    words = "run", "a", *WORDS[:6], "--no-picture", "--no-fields"
+    code, out, _ = command(*words, "--levels", "3", "--sensitivity", "mu")
+    assert code == 0 and "sensitivity: no effect of mu\n" in out
+    _, out, _ = command(*words, "--levels", "3", "--sensitivity", "K_N")
+    rows = [line.split() for line in out.splitlines() if line.startswith("K_N  ")]
+    assert rows and all(row[-2:] == ["0", "0"] for row in rows)
+    assert max(map(len, out[out.index("\nas set") :].splitlines())) <= 80
+
+
 def test_only_stiffnesses_that_are_named_repeat_the_run():
     assert stiffness.named_in("mu, K_T,K_N") == ["K_N", "K_T"]
     assert stiffness.named_in("all") == stiffness.named_in("") == []

@@ -75,6 +75,18 @@ def test_the_report_counts_the_verdicts():
     assert "+50.00 %" in text
 
 
+@pytest.mark.parametrize("family", validation.FAMILIES)
+def test_the_printed_table_fits_80_columns(family):
+    """With the unit and the verdict of each row."""
+    rows = [validation.Comparison(r, r.value * 0.9999) for r in validation.table(family)]
+    lines = validation.printed(rows, 80).splitlines()
+    assert max(map(len, lines)) <= 80
+    table = [line for line in lines if line.endswith("%  pass")]
+    for line, row in zip(table, rows, strict=True):
+        assert f"[{row.reference.unit}]" in line or not row.reference.unit
+    assert rows[0].reference.source in validation.printed(rows, None)
+
+
 def joint_table(rows):
     """Rows of a joint table from (time, x, z, delta_n)."""
     table = {name: np.zeros(len(rows)) for name in JOINT}

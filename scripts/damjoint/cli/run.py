@@ -90,6 +90,6 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
         repeated = stiffness.named_in(arguments.sensitivity or "")
         if repeated and result.last:
             runs = stiffness.repetitions(result.case, result, repeated, arguments.engine)
-            say(*stiffness.lines(list(runs)))
+            say(*stiffness.lines(list(runs), table_width(arguments)))
         code = max(code, int(failed(result)))
     return code

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .options import Parser
+from .options import Parser, say, table_width
 
 SUMMARY = "compare with the published numbers; exit code 1 if a row fails"
 
@@ -28,6 +28,7 @@ def add(command: Parser) -> None:
         help="folder that gets a folder for each case (default: out)",
     )
     command.add_jobs()
+    command.add_wide()
     command.add_engine(", for cases; tests of a point and of an earthquake: condensed")
 
 
@@ -41,10 +42,11 @@ def call(arguments: argparse.Namespace) -> int:
     for family, names in families.items():
         options = validate.Options(arguments.out, arguments.engine)
         comparisons = list(validate.compare(family, names, options, arguments.jobs))
-        print(f"{family.upper()}: {validation.FAMILIES[family]}\n")
-        print(validation.report(comparisons), end="\n\n" if len(families) > 1 else "\n")
+        say(f"{family.upper()}: {validation.FAMILIES[family]}\n")
+        table = validation.printed(comparisons, table_width(arguments))
+        say(table, end="\n\n" if len(families) > 1 else "\n")
         summaries.append(f"{family}: {validation.summary(comparisons)}")
         failed |= any(c.verdict == "fail" for c in comparisons)
     if len(families) > 1:
-        print("\n".join(summaries))
+        say(*summaries)
     return int(failed)

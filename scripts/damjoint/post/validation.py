@@ -15,6 +15,7 @@ from ..arrays import Array
 from ..input.case import Case
 from ..input.case_names import CASES
 from ..model.results import Results
+from .summary import aligned, fitted
 
 #: The families, and what each test shows.
 FAMILIES = {
@@ -167,29 +168,27 @@ def worst(comparisons: list[Comparison]) -> float:
     return max(abs(c.difference) / c.reference.tolerance for c in comparisons)
 
 
-def report(comparisons: list[Comparison], style: str = "simple", notes: bool = False) -> str:
-    """Format the comparisons as a table and a summary line; style: a format of tabulate; notes:
-    with what the rows show.
-    """
-    from tabulate import tabulate
-
-    shown: Callable[[float | None], str] = lambda value: "" if value is None else f"{value:.6g}"
+def columns_of(comparisons: list[Comparison], digits: int = 6) -> dict[str, list[str]]:
+    """The comparisons as columns of text by heading, without those that are empty."""
+    shown: Callable[[float | None], str] = lambda value: (
+        "" if value is None else f"{value:.{digits}g}"
+    )
     rows = [
         (
             c.reference.modeling,
             c.reference.uplift,
             c.reference.quantity,
             *(shown(getattr(c.reference, name)) for name in "xyzt"),
-            f"{c.reference.value:.6g}",
+            shown(c.reference.value),
             shown(c.reference.code),
-            f"{c.computed:.6g}",
+            shown(c.computed),
             c.reference.unit,
             f"{100 * c.difference:+.2f} %",
             f"{100 * c.reference.tolerance:g} %",
             c.verdict,
             c.reference.source,
             EVALUATIONS[c.reference.read_as],
-            c.reference.note if notes else "",
+            c.reference.note,
         )
         for c in comparisons
     ]
@@ -197,10 +196,54 @@ def report(comparisons: list[Comparison], style: str = "simple", notes: bool = F
         *("case", "uplift", "quantity", *"xyzt", "reference", "published code", "computed", "unit"),
         *("difference", "tolerance", "verdict", "source", "evaluation", "note"),
     )
-    used = [k for k, head in enumerate(heads) if any(row[k] for row in rows) or head == "verdict"]
-    chosen = [[row[k] for k in used] for row in rows]
-    text = tabulate(chosen, [heads[k] for k in used], style, disable_numparse=True)
+    columns = dict(zip(heads, map(list, zip(*rows, strict=True)), strict=True))
+    return {h: cells for h, cells in columns.items() if any(cells) or h in ("unit", "verdict")}
+
+
+def report(comparisons: list[Comparison], style: str = "simple") -> str:
+    """Format the comparisons as a table of all columns and a summary line; style: a format of
+    tabulate.
+    """
+    from tabulate import tabulate
+
+    columns = columns_of(comparisons)
+    if not any(columns["unit"]):
+        del columns["unit"]
+    text = tabulate(columns, "keys", style, disable_numparse=True)
     return f"{text}\n\n{summary(comparisons)}"
+
+
+#: Columns that a narrow table leaves out, in this order, and those that it leaves out where they
+#: say the same of all rows.
+LESS, SAME = ("evaluation", "source", "published code", "tolerance", "z", "y"), ("uplift", "x", "t")
+#: Columns of text before the numbers, and after the verdict.
+BEFORE, AFTER = ("case", "uplift", "quantity"), ("source", "evaluation")
+
+
+def printed(comparisons: list[Comparison], width: int | None) -> str:
+    """Format the summary and the comparisons of a family for a terminal of this width, None: with
+    all columns.
+    """
+    columns = columns_of(comparisons, 6 if width is None else 5)
+    columns.pop("note", None)
+    units = columns.pop("unit")
+    columns["quantity"] = [
+        f"{quantity} [{unit}]" if unit else quantity
+        for quantity, unit in zip(columns["quantity"], units, strict=True)
+    ]
+    if width is not None:  # the title above has the family's name
+        family = comparisons[0].reference.family.upper()
+        cases = [case.removeprefix(family) for case in columns["case"]]
+        columns["case"] = cases if all(cases) else columns["case"]
+    names, rows = list(columns), list(zip(*columns.values(), strict=True))
+    heads = ["differs\nby" if name == "difference" else name for name in names]
+    less = *LESS, *(name for name in SAME if len(set(columns.get(name, ()))) == 1)
+
+    def draw(rows: list[tuple[str, ...]], shown: list[str]) -> str:
+        texts = [sum(name in shown for name in group) for group in (BEFORE, AFTER)]
+        return aligned(rows, shown, *texts)
+
+    return f"{summary(comparisons)}\n\n{fitted(names, heads, rows, less, width, draw)}"
 
 
 def summary(comparisons: list[Comparison]) -> str:

@@ -121,7 +121,7 @@ def summary(quake: Earthquake, rows: Table, halvings: int) -> dict[str, Any]:
                 f"the slip reaches {slip:.3g} m{of(quake.case, k)}: equilibrium is that of the "
                 "undeformed dam, and the drains through the joint are taken as intact"
             )
-    result["notes"] += filter(None, (lift_off(quake, rows, k) for k in joints))
+    result["notes"] += lift_offs(quake, rows)
     if "Re" in rows:
         flows = ({n: rows[column_of(n, k)] for n in ("U", "Re")} for k in joints)
         words = map(turbulence, quake.case.joints, flows)
@@ -142,35 +142,43 @@ def intensities(record: Record, period: float) -> dict[str, Any]:
     }
 
 
-def lift_off(quake: Earthquake, rows: Table, number: int) -> str:
-    """What is said of a joint, by its number, that opens throughout and lands again; else empty."""
-    case, joint = quake.case, quake.problem.model.equilibrium.interface.joints[number]
-    size, own = case.joints[number].joint_along, case.joints[number]
-    normal = np.abs(rows[column_of("N", number)])
-    opened = rows[column_of("open_length", number)] > OPEN * size
-    lifted = opened & (normal < UNLOADED * normal.max())
-    landings = np.count_nonzero(lifted[:-1] & ~lifted[1:])
-    if not landings:
-        return ""
-    above = case.graph.separated([number])
-    across = quake.system.translation(joint, above, joint.chord.normal)
-    mass = float(across @ quake.system.mass @ across) / joint.width
-    period = 2 * math.pi * math.sqrt(mass / (own["K_N"] * size))
-    first, share = rows["time"][lifted][0], rows["dt"][lifted].sum() / rows["dt"].sum()
-    where = case.named((number,)) or "the joint"
-    text = (
-        f"what is above {where} lifts off and lands again, {landings} "
-        f"time{'s' if landings > 1 else ''} from t = {first:.3f} s on, {share:.0%} of the time: "
-        "the contact is elastic, without damping of an impact but by joint_damping_n"
-    )
-    if period < STEPS_OF_IMPACT * quake.dt:
-        text += (
-            f"; the period of the contact (the mass above on K_N), {period:.3g} s, has "
-            f"{period / quake.dt:.2g} steps, too few for its impacts, which may add energy: what "
-            "follows is not reliable, accelerations least; compare with dt = "
-            f"{period / STEPS_OF_IMPACT:.2g}"
+def lift_offs(quake: Earthquake, rows: Table) -> list[str]:
+    """What is said of the joints that open throughout and land again: a line with the numbers of
+    each, if there is one.
+    """
+    case, said, shortest = quake.case, list[str](), math.inf
+    for number, own in enumerate(case.joints):
+        joint = quake.problem.model.equilibrium.interface.joints[number]
+        normal = np.abs(rows[column_of("N", number)])
+        opened = rows[column_of("open_length", number)] > OPEN * own.joint_along
+        lifted = opened & (normal < UNLOADED * normal.max())
+        landings = np.count_nonzero(lifted[:-1] & ~lifted[1:])
+        if not landings:
+            continue
+        above = case.graph.separated([number])
+        across = quake.system.translation(joint, above, joint.chord.normal)
+        mass = float(across @ quake.system.mass @ across) / joint.width
+        period = 2 * math.pi * math.sqrt(mass / (own["K_N"] * own.joint_along))
+        shortest = min(shortest, period)
+        first, share = rows["time"][lifted][0], rows["dt"][lifted].sum() / rows["dt"].sum()
+        said.append(
+            f"{case.named((number,)) or 'the joint'} lifts off and lands again, {landings} "
+            f"time{'s' if landings > 1 else ''} from t = {first:.3f} s on, {share:.0%} of the time"
         )
-    return text
+    if not said:
+        return []
+    text = (
+        f"what is above {'; above '.join(said)}: the contact is elastic, without damping of an "
+        "impact but by joint_damping_n"
+    )
+    if shortest < STEPS_OF_IMPACT * quake.dt:
+        text += (
+            f"; the {'shortest ' * (len(said) > 1)}period of the contact (the mass above on K_N), "
+            f"{shortest:.3g} s, has {shortest / quake.dt:.2g} steps, too few for its impacts, "
+            "which may add energy: what follows is not reliable, accelerations least; compare "
+            f"with dt = {shortest / STEPS_OF_IMPACT:.2g}"
+        )
+    return [text]
 
 
 def notes(quake: Earthquake) -> list[str]:

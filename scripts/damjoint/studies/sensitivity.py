@@ -278,9 +278,12 @@ def write(
         results.info["sensitivity"] = {"statement": str(error), "changes": []}
         return
     write_csv(folder / FILE, {n: np.array(v) for n, v in table(rows).items()})
-    listed = changes(rows, printed)
-    results.info["sensitivity"] = {"statement": "", "changes": listed}
-    if picture:
+    listed = changes(rows, printed, {n: abs(v) for n, v in results.last.items()})
+    shown = [entry["parameter"] for entry in listed]
+    without = dict.fromkeys(row.name for row in rows if row.name not in shown)
+    statement = "" if listed else f"sensitivity: no effect of {', '.join(without)}"
+    results.info["sensitivity"] = {"statement": statement, "changes": listed}
+    if picture and listed:
         draw_changes(listed, results.case, rows[-1].level, folder)
 
 
@@ -295,10 +298,13 @@ def draw_changes(
 
 
 def changes(
-    rows: Sequence[Sensitivity], printed: Sequence[tuple[str, str, float]]
+    rows: Sequence[Sensitivity],
+    printed: Sequence[tuple[str, str, float]],
+    sizes_of: Mapping[str, float] | None = None,
 ) -> list[dict[str, Value]]:
     """What one percent more of each parameter changes at the last level, the largest change first;
     of a parameter that is zero, its unit, after the others. Those without an effect are left out.
+    sizes_of: of the results, by column, for what is round-off beside them.
     """
     last = [row for row in rows if row.level == rows[-1].level]
     printed = [entry for entry in printed if all(entry[0] in row.derivatives for row in last)]
@@ -309,7 +315,10 @@ def changes(
             for row in last
         ]
     )
-    sizes[np.abs(sizes) < ROUNDING * np.abs(sizes).max(axis=0)] = 0.0
+    largest = np.abs(sizes).max(axis=0)
+    if sizes_of:
+        largest = np.maximum(largest, [sizes_of.get(n, 0.0) * by for n, _, by in printed])
+    sizes[np.abs(sizes) < ROUNDING * largest] = 0.0
     listed: list[dict[str, Value]] = []
     for k in sorted(range(len(last)), key=lambda k: (last[k].value == 0, -abs(sizes[k, 0]))):
         row = last[k]

@@ -7,6 +7,7 @@ over decades, for which a derivative does not stand.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from .. import InputError, RunError
 from ..input.case import Case
 from ..input.resolve import varied
 from ..model.results import Results
-from ..post.summary import Table, aligned, table_of
+from ..post.summary import Table, aligned, fitted, table_of
 from ..runner import compute
 from ..statics import gravity
 from ..statics.verdict import verdict
@@ -103,11 +104,15 @@ def table(runs: Sequence[tuple[str, Results | str]]) -> tuple[Table, list[str]]:
     return cells, messages
 
 
-def lines(runs: Sequence[tuple[str, Results | str]]) -> list[str]:
-    """The table as text, and the messages."""
+#: Columns that a narrow table leaves out, in this order.
+LESS = ("level", "slipped", "tangential jump")
+
+
+def lines(runs: Sequence[tuple[str, Results | str]], width: int | None = None) -> list[str]:
+    """The table as text, and the messages; width: of the terminal, None: all columns."""
     cells, messages = table(runs)
-    heads = [f"{n}\n[{u}]" if u else n for n, u in zip(cells.names, cells.units, strict=True)]
-    return [aligned(cells.rows, heads, left=1), *messages]
+    draw = partial(aligned, left=2 if "joint" in cells.names else 1)
+    return [fitted(cells.names, cells.stacked, cells.rows, LESS, width, draw), *messages]
 
 
 def state_of(result: Results) -> dict[str, float]:
