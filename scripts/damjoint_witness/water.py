@@ -32,6 +32,8 @@ DIGITS, IN_3D = 1e-9, 1e-6
 HEAD_DIGITS = 10
 #: Places of nodes have 9 decimals [m].
 SAME_PLACE = 1e-7
+#: Part of their effect below which drains have none [-]: rounding.
+NO_EFFECT = 1e-9
 #: Times that differ by less are the same.
 SAME_TIME = 1e-9
 #: Aperture of the closed joint [m] with uplift = cracked, and the largest growth over it.
@@ -281,6 +283,14 @@ class Flow:
         )
         return Flow(*((1 - share) * own + share * its for own, its in pairs))
 
+    def plus(self, share: float, one: Flow, other: Flow) -> Flow:
+        """Return the sum with a share of the difference of two solutions."""
+        return Flow(
+            self.heads + share * (one.heads - other.heads),
+            self.drops + share * (one.drops - other.drops),
+            self.inflow + share * (one.inflow - other.inflow),
+        )
+
 
 @dataclass(frozen=True)
 class Graph:
@@ -344,6 +354,17 @@ class Surface:
 
 
 @dataclass(frozen=True)
+class DrainLine:
+    """Drains of a joint: its number; nodes and heads of their outlets [m]; the part of their effect
+    that a crack in the elements beside them has left.
+    """
+
+    joint: int
+    outlets: dict[int, float]
+    left: float
+
+
+@dataclass(frozen=True)
 class Network:
     """Joints whose water is one: their states, and the nodes of order 1 of all of them."""
 
@@ -391,18 +412,21 @@ class Network:
         return [joint.widening() for joint in self.joints]
 
     def conductivities(
-        self, uniform: bool, drops: Array | None = None
+        self, uniform: bool, drops: Array | None = None, closed: Sequence[int] = ()
     ) -> Iterator[tuple[Sides, IntArray, Array]]:
         """Yield elements, their nodes, and w^3 times weights at the points of the law (m, q), in a
         unit that is that of all joints; uniform: w = 1; drops: of the head along the elements (m,)
-        [m], under which the flow is turbulent, w^3 less by `slowed`.
+        [m], under which the flow is turbulent, w^3 less by `slowed`; closed: nodes in whose
+        elements the joint conducts as if closed.
         """
         first = 0
         for joint, tables, widening in zip(self.joints, self.tables, self.widening, strict=True):
-            closed = joint.values["aperture_min"] if self.by_aperture else 1.0
+            narrowest = joint.values["aperture_min"] if self.by_aperture else 1.0
             for sides, table, factor in zip(joint.sides, tables, widening, strict=True):
                 _, w = joint_rule(sides.shape, sides.order, joint.values["quadrature"])
-                cube = np.ones_like(factor) if uniform else (closed * factor) ** 3
+                shut = np.isin(table, list(closed)).any(axis=1, keepdims=True)
+                cube = np.where(shut, 1, factor)
+                cube = np.ones_like(factor) if uniform else (narrowest * cube) ** 3
                 if drops is not None and joint.values["uplift"] == "flow":
                     own = drops[first : first + len(table)]
                     cube = cube * joint.slowed(cube, own / (2 * sides.measures))
@@ -430,11 +454,13 @@ class Network:
                 break
         return found
 
-    def operator(self, uniform: bool, drops: Array | None = None) -> Graph | Surface:
-        """Return the equations of the flow; uniform: of a uniform aperture; drops: see
+    def operator(
+        self, uniform: bool, drops: Array | None = None, closed: Sequence[int] = ()
+    ) -> Graph | Surface:
+        """Return the equations of the flow; uniform: of a uniform aperture; drops, closed: see
         `conductivities`.
         """
-        parts = list(self.conductivities(uniform, drops))
+        parts = list(self.conductivities(uniform, drops, closed))
         if self.first.values["dim"] == 2:
             by_length = [c.sum(axis=1) / (2 * s.measures) ** 2 for s, _, c in parts]
             pairs = np.concatenate([table for _, table, _ in parts])
@@ -532,7 +558,10 @@ class Network:
         """Solve the flow, with the heads [m] at drains by node."""
         if uniform:
             return self._solve(self.operator(uniform), drains or {})
-        return self.settled(lambda drops: self._solve(self.operator(False, drops), drains or {}))
+        closed = self.closed if drains else ()
+        return self.settled(
+            lambda drops: self._solve(self.operator(False, drops, closed), drains or {})
+        )
 
     def _solve(self, operator: Graph | Surface, drains: dict[int, float]) -> Flow:
         heads, exits = self.fixed()
@@ -547,10 +576,17 @@ class Network:
             heads = {n: head for n, head in heads.items() if n not in entering}
 
     def drains(self) -> tuple[dict[int, float], float]:
-        """Return the nodes of drains that no crack has reached and the heads [m] of their outlets;
-        their effectiveness.
+        """Return the nodes of drains that act and the heads [m] of their outlets; their
+        effectiveness.
         """
-        found, effect = {}, 0.0
+        nodes = {n: head for line in self.drain_lines for n, head in line.outlets.items()}
+        values = [self.joints[line.joint].values for line in self.drain_lines]
+        return nodes, float(values[0]["drain_effectiveness"]) if values else 0.0
+
+    @cached_property
+    def drain_lines(self) -> list[DrainLine]:
+        """The drains that a crack has left a part of their effect."""
+        lines = []
         for k, joint in enumerate(self.joints):
             values = joint.values
             if values["uplift"] not in FLOWING or not values["drains"]:
@@ -558,27 +594,63 @@ class Network:
             own = self.nodes_of(k)
             s = joint.rows["s"][joint.find(self.nodes[own])]
             inner = (s > s.min() + SAME_PLACE) & (s < s.max() - SAME_PLACE)
-            own, away = own[inner], np.abs(s[inner] - values["drain_x"])
-            nodes = own[away < away.min() + SAME_PLACE]
-            beside = [
-                factor[np.isin(table, nodes).any(axis=1)]
-                for table, factor in zip(self.tables[k], self.widening[k], strict=True)
-            ]
-            if values["uplift"] == "cracked" and any((f > 1).any() for f in beside):
-                continue
-            effect = values["drain_effectiveness"]
-            for n in nodes.tolist():
-                found[n] = float(max(self.nodes[n, 1], values["drain_level"], joint.tail))
-        return found, effect
+            own, s = own[inner], s[inner]
+            away = np.abs(s - values["drain_x"])
+            here = away < away.min() + SAME_PLACE
+            outlets = {
+                n: float(max(self.nodes[n, 1], values["drain_level"], joint.tail))
+                for n in own[here].tolist()
+            }
+            left = 1.0
+            if values["uplift"] == "cracked":
+                left -= self.cracked_beside(k, own[here], float(s[here].mean()))
+            if left > NO_EFFECT:
+                lines.append(DrainLine(k, outlets, left))
+        return lines
+
+    def cracked_beside(self, joint: int, nodes: IntArray, place: float) -> float:
+        """Return the cracked part of the elements before drains at a place [m from the heel], plus
+        that of those behind them.
+        """
+        state, parts = self.joints[joint], {-1: [0.0, 0.0], 1: [0.0, 0.0]}
+        for sides, table, factor in zip(
+            state.sides, self.tables[joint], self.widening[joint], strict=True
+        ):
+            _, w = joint_rule(sides.shape, sides.order, state.values["quadrature"])
+            touching = np.isin(table, nodes).any(axis=1)
+            middles = state.distance(sides.corners.mean(axis=1))
+            sizes = np.outer(sides.measures, w)
+            for side, part in parts.items():
+                beside = touching & (side * (middles - place) > 0)
+                part[0] += float((sizes * (factor - 1) / CRACK_MOST)[beside].sum())
+                part[1] += float(sizes[beside].sum())
+        return sum(cracked / whole for cracked, whole in parts.values() if whole)
+
+    @cached_property
+    def closed(self) -> list[int]:
+        """Nodes of drains that fade. The elements beside them lose the head between crack and
+        drains.
+        """
+        return [n for line in self.drain_lines if line.left < 1 for n in line.outlets]
 
     @cached_property
     def flow(self) -> Flow:
-        """The flow: drains remove a part of the head that there would be without them."""
+        """The flow: drains remove a part of the head that there would be without them. Of drains
+        that fade as much as is left acts with all others, the rest of these without them.
+        """
         free = self.solve(uniform=not self.flowing)
         drains, effect = self.drains()
         if not drains or not effect or any(free.heads[n] <= head for n, head in drains.items()):
             return free
-        return free.mixed(effect, self.solve(False, drains))
+        found, last = free, 0.0
+        for left in sorted({line.left for line in self.drain_lines}):
+            lines = [line for line in self.drain_lines if line.left >= left]
+            fixed = {n: head for line in lines for n, head in line.outlets.items()}
+            layer = self.solve(False, fixed)
+            share = effect * (left - last)
+            found = found.plus(share, layer, free)
+            last = left
+        return found
 
     @property
     def heads(self) -> Array:

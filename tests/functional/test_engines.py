@@ -194,6 +194,7 @@ WARM = {"temperature_dam": -8.0, "temperature_linear": 15.0, "temperature_found"
 STOPPED = {"joint_height": 20.0, "uplift": "waterstop", "waterstop": 5.2, "sigma_max": 2e4}
 SOLID = {"dim": 3.0, "thickness": 3.0, "n_layers": 2.0, "mesh_pattern": "split", "n_joint": 10.0}
 DRAINS = {"drains": 1.0, "drain_x": 6.1, "sigma_max": 1e4}
+FADING = {"dam_height": 80.0, "dam_base": 60.0, "uplift": "cracked", "sigma_max": 0.0}
 BROKEN = {"uplift": "cracked", "law": "friction", "adhesion": 2e5}
 SECTIONS = {
     "all loads": (SHAPE | STAGED, "20,41", "0"),
@@ -219,6 +220,7 @@ SECTIONS = {
     "drains, flow": (DRAINS | {"uplift": "flow", "joint_slope": 2.0}, "30,46", "0,5"),
     "drains, flow driven": (DRAINS | {"uplift": "flow", "drive": "crest"}, "20,40", "0"),
     "drains, cracked": (DRAINS | BROKEN, "40,50", "0,5"),
+    "drains, cracked beside them": (DRAINS | FADING | {"drain_x": 6.0}, "60,78", "0"),
     "drains in the crack": (DRAINS | BROKEN | {"drain_x": 1.8, "order": 1.0}, "40,48,49", "0"),
     "waterstop": (STOPPED | {"joint_slope": 6.0}, "30,47,41", "0"),
     "waterstop driven": (STOPPED | {"drive": "crest", "drive_by": 5e-4}, "40,45", "0"),

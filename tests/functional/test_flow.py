@@ -117,3 +117,17 @@ def test_no_water_enters_at_a_dry_end(tmp_path, engine, slope, level, tail):
         assert result.history["U"][-1] == pytest.approx(
             gravity.at(case, 1).U, rel=1e-9 if uplift == "imposed" else 1e-3
         )
+
+
+def test_a_crack_ends_the_effect_of_drains_while_it_grows_through_an_element(solve):
+    """Drains behind the first element: the Gauss points of it that are closed leave as much of the
+    effect as their weights. Full head in the crack, linear from the drains to the toe.
+    """
+    drains = {"drains": 1.0, "drain_x": 6.0, "drain_effectiveness": 2 / 3}
+    dam = {"dam_height": 80.0, "dam_base": 60.0, "n_joint": 8.0, "h_dam": 12.0, "h_found": 40.0}
+    settings = dam | drains | {"uplift": "cracked", "sigma_max": 0.0}
+    (result,) = solve("dam", "60,78", "0", **settings)
+    assert 0 < result.last["crack_length"] < 6
+    head = 78 * (1 - 2 / 3 * 13 / 18)
+    force = WATER * ((78 + head) / 2 * 6 + head / 2 * 54)
+    assert result.last["U"] == pytest.approx(force, rel=1e-5)

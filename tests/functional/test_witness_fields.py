@@ -41,6 +41,8 @@ SCENES = {
     "turbulent flood": "run dam --set law=friction --set adhesion=0 --set mu=1.5 --set dam_base=28 "
     "--set order=1 --set uplift=flow --set turbulent=1 --set visc=1e-5 --set aperture_elastic=2e-4 "
     "--set time_unit=3 --set storage=1e-11 --set drains=1 --set drain_x=7 --levels 44 --steps 2",
+    "fading drains": "run dam --set dam_height=80 --set dam_base=60 --set uplift=cracked --set "
+    "drains=1 --set drain_x=6 --set sigma_max=0 --levels 60,78",
     "flood of blocks": "run monoliths --run-geo --set uplift=flow --set time_unit=60 --set "
     "storage=1e-12 --levels 30,44,20 --steps 2",
 }

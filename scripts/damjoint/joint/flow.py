@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -136,6 +136,17 @@ class FlowSolution:
 
     pressure: Array
     systems: list[FlowSystem]
+    #: of drains whose effect fades: derivative of the pressure with the part of it that is left,
+    #: and of this part with the opening at the Gauss points (q,)
+    fades: list[tuple[Array, Array]] = field(default_factory=list)
+
+    def closed_at(self, shut: BoolArray) -> FlowSolution:
+        """The same, at Gauss points (q,) whose conductivity does not grow with the opening."""
+        systems = [
+            replace(s, slowed=np.where(shut, 0, 1 if s.slowed is None else s.slowed))
+            for s in self.systems
+        ]
+        return replace(self, systems=systems)
 
     def mixed(self, share: float, other: FlowSolution) -> FlowSolution:
         """Mean with another solution of some share (0 to 1)."""
@@ -541,7 +552,8 @@ class Flow:
                 parts.append(coupling(self.storing, np.where(rate != 0, stored, 0)))
             return -system.inverse(np.asarray(sum(parts)))
 
-        parts = (system.share * of(system) for system in solution.systems)
+        parts = [system.share * of(system) for system in solution.systems]
+        parts += [np.outer(by, (opening.T @ part)[columns]) for by, part in solution.fades]
         return FlowDerivative(pressure=np.asarray(sum(parts)), columns=columns)
 
     def flux(

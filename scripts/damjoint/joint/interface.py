@@ -187,9 +187,10 @@ class JointInterface:
         """Normalised path coordinate of each location, from heel (0) to toe (1)."""
         return np.asarray(self.fields.at_locations @ self.fields.xi)
 
-    def drains(self, distance: float) -> tuple[IntArray, IntArray]:
-        """Nodes nearest to a line at a distance from the heel along the joint [m], and the Gauss
-        points of their elements.
+    def drains(self, distance: float) -> tuple[IntArray, Array]:
+        """Nodes nearest to a line at a distance from the heel along the joint [m], and weights of
+        the Gauss points (q,) in the elements beside them: those before the line sum up to one, and
+        those behind it.
         """
         xi, tables = self.fields.xi, [table for _, table in self.surface.cells]
         at, near, same = distance / self.length, [], ROUND_OFF
@@ -200,8 +201,14 @@ class JointInterface:
             near.append(crossed[away <= away.min(axis=1, keepdims=True) + same])
         nearest = np.concatenate(near)
         nodes = distinct(nearest[np.isin(nearest, self.fields.inside)])
-        beside = np.concatenate([np.isin(table, nodes).any(axis=1) for table in tables])
-        return nodes, np.flatnonzero(beside[self.points.elements])
+        touching = np.concatenate([np.isin(table, nodes).any(axis=1) for table in tables])
+        middles = np.concatenate([xi[table].mean(axis=1) for table in tables])
+        weights = np.zeros(len(self.points.weights))
+        for side in (-1, 1):
+            beside = touching & (side * (middles - xi[nodes].mean()) > 0)
+            of_side = np.where(beside[self.points.elements], self.points.weights, 0)
+            weights += of_side / (of_side.sum() or 1)
+        return nodes, weights
 
 
 class Interface:

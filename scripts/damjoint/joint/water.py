@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,17 @@ class BeforeQuake:
 
     jump: Array
     variables: JointVariables
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drainage:
+    """Drains of flowing water: their joint, the part of their effect that a crack leaves (0 to 1),
+    and its derivative with the opening at the joint's points.
+    """
+
+    water: JointWater
+    left: float
+    rate: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +89,7 @@ class JointWater:
         self.wet = case["uplift"] != "none" and self.waterstop != 0
         #: whether the flow is computed, here or in a joint that exchanges water with this one
         self.flowing = flows(case)
-        #: nodes and points of the drains of flowing water
+        #: of the drains of flowing water: nodes, and weights of the points in elements beside them
         drained = self.flowing and has_drains(case)
         self.drains = joint.drains(case["drain_x"]) if drained else None
         self.unit_weight = case["rho_water"] * case["g"]
@@ -215,10 +227,19 @@ class JointWater:
         outlet = np.maximum(height, max(self.case["drain_level"], loading.tail))
         return self.nodes[nodes], outlet
 
-    def cracked_to_drains(self, factor: Array) -> bool:
-        """Whether a crack has reached the drains, by the `conductivity` (q,)."""
+    def drainage(self, jump: Array, variables: Any) -> Drainage:
+        """What a crack leaves of the effect of the drains: the part of the elements beside them
+        that has not opened to the water.
+        """
         assert self.drains
-        return self.case["uplift"] == "cracked" and bool((factor[self.drains[1]] > 1).any())
+        _, beside = self.drains
+        if self.case["uplift"] != "cracked":
+            return Drainage(water=self, left=1.0, rate=np.zeros(len(beside)))
+        (factor, growth), most = self.aperture(jump, variables), self.case.shared["crack_most"][0]
+        left = 1 - float(beside @ (factor - 1)) / most
+        if left < ROUND_OFF:
+            return Drainage(water=self, left=0.0, rate=np.zeros(len(beside)))
+        return Drainage(water=self, left=left, rate=-beside * growth / most)
 
     def opened(
         self, jump: Array, variables: JointVariables, before_quake: BeforeQuake | None
@@ -415,7 +436,8 @@ class WaterSystem:
         Drains reduce the head above their outlet, the tailwater or their own height, by their
         effectiveness e: the pressure is e times that with the outlet's head at the drains, plus
         1 - e times that without drains. A crack that reaches the drains ends their effect
-        (EM 1110-2-2200).
+        (EM 1110-2-2200): e falls to zero while it grows through the elements beside them, in which
+        all the head between it and the drains is lost meanwhile.
         """
         opened = [water.opened(jump, variables, before_quake) for water in self.members]
         factors = [
@@ -433,7 +455,7 @@ class WaterSystem:
             ends, exits = self._ends(loading)
             at_ends = weight * ends
 
-        def solved(nodes: IntArray, outlet: Array) -> FlowSolution:
+        def solved(conductivity: Array, nodes: IntArray, outlet: Array) -> FlowSolution:
             if not self.turbulent.any():
                 return by_conductivity(conductivity, nodes, outlet)
             per_gradient = 2 * self.reference * conductivity / self.flow.points.weights
@@ -461,21 +483,62 @@ class WaterSystem:
                 return replace(solution, pressure=beyond)
             return solution
 
-        free = solved(NO_NODES, np.zeros(0))
-        drained = [
-            water
-            for water, factor in zip(self.members, factors, strict=True)
-            if water.drains and not water.cracked_to_drains(factor)
+        free = solved(conductivity, NO_NODES, np.zeros(0))
+        all_drains = [
+            water.drainage(*at)
+            for water, at in zip(self.members, opened, strict=True)
+            if water.drains
         ]
-        if not drained:
+        acting = [drains for drains in all_drains if drains.left]
+        if not acting:
             return free
-        lines = [water.outlets(loading) for water in drained]
-        nodes, outlet = (np.concatenate(parts) for parts in zip(*lines, strict=True))
+        nodes, outlet = outlets(acting, loading)
         at_drains = head[nodes] + self.expand_to_nodes(free)[nodes] / weight
-        effect = drained[0].case["drain_effectiveness"]
+        effect = acting[0].water.case["drain_effectiveness"]
         if not (at_drains > outlet).all() or effect == 0:
             return free
-        return free.mixed(effect, solved(nodes, outlet))
+        if all(drains.left == 1 for drains in acting):
+            return free.mixed(effect, solved(conductivity, nodes, outlet))
+        return self.with_fading(free, acting, conductivity, loading, solved, before_quake)
+
+    def with_fading(
+        self,
+        free: FlowSolution,
+        acting: list[Drainage],
+        conductivity: Array,
+        loading: Loading,
+        solved: Callable[[Array, IntArray, Array], FlowSolution],
+        before_quake: BeforeQuake | None,
+    ) -> FlowSolution:
+        """The flow with drains of which a crack leaves a part: free, without drains; acting: those
+        that do; conductivity, loading, before_quake: see `solve`; solved: the flow for
+        conductivities and heads at drains. The elements beside fading drains are closed in it.
+        """
+        effect = acting[0].water.case["drain_effectiveness"]
+        shut, closed = np.zeros(len(conductivity), bool), conductivity.copy()
+        for drains in acting:
+            if drains.left < 1:
+                water, of_joint = drains.water, self.slice_of(drains.water)
+                assert water.drains
+                shut[of_joint] = water.drains[1] > 0
+                closed[of_joint] = water.scale * water.joint.points.weights
+        conductivity = np.where(shut, closed, conductivity)
+        # as much as is left of all drains, then as much as is left of all but the most faded ones
+        left, layers = sorted({drains.left for drains in acting}), list[FlowSolution]()
+        for least in left:
+            of_layer = outlets([drains for drains in acting if drains.left >= least], loading)
+            layers.append(solved(conductivity, *of_layer).closed_at(shut))
+        mean = layers[0]
+        for (less, more), layer in zip(pairwise(left), layers[1:], strict=True):
+            mean = layer.mixed(less / more, mean)
+        fades = []
+        for drains in acting:
+            if drains.left < 1 and not (before_quake and drains.water.freezes_uplift):
+                number, rate = left.index(drains.left), np.zeros(len(conductivity))
+                rate[self.slice_of(drains.water)] = drains.rate
+                with_it, without = [*layers, free][number : number + 2]
+                fades.append((effect * (with_it.pressure - without.pressure), rate))
+        return replace(free.mixed(effect * left[-1], mean), fades=fades)
 
     def solve_in_time(
         self,
@@ -560,14 +623,18 @@ class WaterSystem:
         """Gradient of the total head times the water's weight at the Gauss points of one of the
         joints, along the axes of its `JointFields`.
         """
-        sizes = [len(member.joint.points.weights) for member in self.members]
-        first = sum(sizes[: self.members.index(water)])
-        of_joint = slice(first, first + len(water.joint.points.weights))
+        of_joint = self.slice_of(water)
         by_axis = {
             axis: sum(system.share * system.gradients[k][of_joint] for system in solution.systems)
             for k, axis in enumerate(self.fields.axes)
         }
         return [np.asarray(by_axis[axis]) for axis in water.joint.fields.axes]
+
+    def slice_of(self, water: JointWater) -> slice:
+        """The Gauss points of one of the joints among those of all."""
+        sizes = [len(member.joint.points.weights) for member in self.members]
+        number = self.members.index(water)
+        return slice(sum(sizes[:number]), sum(sizes[: number + 1]))
 
     def derivative(
         self,
@@ -596,6 +663,12 @@ class WaterSystem:
         ]
         stored = self.flow.points.weights * np.concatenate(growth) / step.seconds
         return self.flow.derivative(solution, self.reference * np.concatenate(rates), stored)
+
+
+def outlets(drains: list[Drainage], loading: Loading) -> tuple[IntArray, Array]:
+    """Nodes of drains, by their numbers in `WaterSystem`, and heads of their outlets [m]."""
+    nodes, heads = zip(*(line.water.outlets(loading) for line in drains), strict=True)
+    return np.concatenate(nodes), np.concatenate(heads)
 
 
 def water_systems(waters: Sequence[JointWater], interface: Interface) -> list[WaterSystem]:

@@ -34,8 +34,8 @@ from .critical_value import CriticalValue
 from .critical_words import (
     beyond_limit,
     by_increments,
-    end_at_drains,
     end_of_branch,
+    end_of_entering,
     events_on,
     falls_at_once,
     lost_beyond_limit,
@@ -297,8 +297,8 @@ class Search:
             result = replace(result, mode="sliding", why=slips_whole(path), doubt="")
         elif not result.why and path.falls:
             result = replace(result, why=lost_beyond_limit(path), doubt="")
-        elif not result.why and path.stops and path.loses_drains:
-            result = replace(result, doubt=end_at_drains(path))
+        elif not result.why and path.stops and path.entering:
+            result = replace(result, doubt=end_of_entering(path))
         elif not result.why and path.stops:
             result = replace(result, why=end_of_branch(path), doubt="")
         if path.begun_by_run and point is path.points[0]:

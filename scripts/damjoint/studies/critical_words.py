@@ -47,11 +47,11 @@ def end_of_branch(path: FailurePath) -> str:
     )
 
 
-def end_at_drains(path: FailurePath) -> str:
-    """What is said of a path that ends where a crack may end the effect of drains at once."""
+def end_of_entering(path: FailurePath) -> str:
+    """What is said of a path that ends while water enters the crack."""
     return (
-        "there the branch of equilibria ends, but the effect of the drains ends at once where a "
-        "crack reaches them: another path may lead to another level"
+        "there the branch of equilibria ends, but water enters the crack at single points, each of "
+        "which turns the path: another path may lead to another level"
     )
 
 
