@@ -68,9 +68,6 @@ class BodyControl(DisplacementControl):
         return equilibrium.displacement_rate(self.name, loading, self.unknown)
 
 
-CrestControl = BodyControl
-
-
 @dataclass(frozen=True)
 class HeelControl(DisplacementControl):
     """The opening of the heel of the first joint."""

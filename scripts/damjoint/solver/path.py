@@ -25,8 +25,8 @@ from ..arrays import Array
 from ..input.case import Case
 from ..model.results import column_of
 from .controls import (
+    BodyControl,
     Control,
-    CrestControl,
     DirectionControl,
     DisplacementControl,
     HeelControl,
@@ -259,7 +259,7 @@ class Point:
         crests = self.history.rows["crest_ux"][-2:]
         controls: dict[str, DisplacementControl] = {}
         if crests[-1] >= crests[0]:
-            controls["crest"] = CrestControl(0.0)
+            controls["crest"] = BodyControl(0.0)
         if arc := self.towards(self.movement):
             controls["arc"] = arc
         zone = process_zone(self.model.equilibrium, self.state)
@@ -432,10 +432,10 @@ class EquilibriumPath:
         self.interval = np.nan, np.nan
         #: the longest increment [m]
         self.longest = np.inf
-        #: the predictor's error in the last increment, over what is allowed; 0: unknown
-        self.error = 0.0
         #: intervals in which no increment leads to a state of the branch, by the points before them
         self.closed = list[Point]()
+        #: increments that have not converged, of this path and its copies, by point and control
+        self.failed = dict[tuple[int, str, float], Point]()
 
     @property
     def falls(self) -> bool:
@@ -590,9 +590,10 @@ class EquilibriumPath:
                 by = part * self.increment(control)
                 if abs(by) < max(LEAST * self.imposed(last), self.negligible(last, control)):
                     continue
-                if new := self.along(last, control, by, SHORTENED * abs(by), kind):
+                new, error = self.along(last, control, by, SHORTENED * abs(by), kind)
+                if new:
                     reached = new[-1].imposed - self.imposed(last)
-                    self.append(new, shortened=reached < 0.9 * abs(by) or part < 1)
+                    self.append(new, error=error, shortened=reached < 0.9 * abs(by) or part < 1)
                     short = reached < CRAWL * self.imposed(last)
                     self.crawled = self.crawled + 1 if short else 0
                     return True
@@ -627,7 +628,7 @@ class EquilibriumPath:
         """
         far, crest = self.imposed(last), last.history.rows["crest_ux"][-2:]
         by = max(self.over, SHORT * far)
-        controls = {"crest": CrestControl(0.0), **last.controls, "heel": HeelControl(0.0)}
+        controls = {"crest": BodyControl(0.0), **last.controls, "heel": HeelControl(0.0)}
         zone = last.controls.get("zone")
         lengths = {"crest": by, "zone": ZONE_GROWTH * last.moved(zone) if zone else 0.0, "heel": by}
         backwards = last.control == "zone" and crest[-1] < crest[0]
@@ -657,15 +658,18 @@ class EquilibriumPath:
                 return last.after(result, self.imposed(last) + by, "level")
         return None
 
-    def append(self, new: list[Point], another: bool = False, shortened: bool = False) -> None:
+    def append(
+        self, new: list[Point], another: bool = False, error: float = 0.0, shortened: bool = False
+    ) -> None:
         """Append equilibria, reached by an increment, and choose the next increment; another:
-        whether they may be of another branch; shortened: whether a longer one was tried first.
+        whether they may be of another branch; error: see `along`; shortened: whether a longer one
+        was tried first.
         """
         last = self.points[-1]
         if another and len(self.points) > 1:  # nothing has led to the first point
             self.starts.append(len(self.points))
         rise = (new[-1].level - last.level) / new[-1].level
-        growth = min(self.rise / max(rise, 1e-12), SAFETY / self.error if self.error else np.inf)
+        growth = min(self.rise / max(rise, 1e-12), SAFETY / error if error else np.inf)
         growth = min(max(growth, SHRINKING), 1.0 if shortened else GROWTH)
         self.growth = growth * len(new)
         for point in new:
@@ -684,9 +688,11 @@ class EquilibriumPath:
 
     def along(
         self, point: Point, control: DisplacementControl, by: float, smallest: float, kind: str
-    ) -> list[Point]:
+    ) -> tuple[list[Point], float]:
         """The equilibria at the middle and at the end of the longest increment from a point that
         belongs to the branch, from a length down to the smallest one [m]; empty if there is none.
+        Or that at the end only, if it is as predicted, with the predictor's error over what is
+        allowed; 0: not known.
         """
         whole: Point | None = None
         while abs(by) > smallest:
@@ -696,21 +702,24 @@ class EquilibriumPath:
                 by *= SHRINKING
                 continue
             if not (self.verified and point.model.equilibrium.path_dependent):
-                return [whole]
-            if self.predicted(point, whole):
-                return [whole]
+                return [whole], 0.0
+            error = self.predictor_error(point, whole)
+            if error <= 1:
+                return [whole], error
             middle = self.step(point, point.further(control, by / 2), by / 2, kind)
             end = middle and self.step(middle, ahead, by / 2, kind)
             if middle and end and self.agree(point, whole, middle, end) and not end.unloads(point):
                 moved = np.abs(end.state.jump - point.state.jump).max()
                 if moved < SHORT * self.imposed(point) or self.straight(point, middle, end):
-                    return [middle, end]
+                    return [middle, end], 0.0
             whole, by = middle, by / 2 * (SHRINKING if middle is None else 1)
-        return []
+        return [], 0.0
 
-    def predicted(self, begin: Point, end: Point) -> bool:
-        """Whether an increment needs no halves, as it continues the one before."""
-        return False
+    def predictor_error(self, begin: Point, end: Point) -> float:
+        """How far an increment is off the one before, over what is allowed if it is to need no
+        halves; inf if it needs them.
+        """
+        return np.inf
 
     def agree(self, begin: Point, whole: Point, middle: Point, end: Point) -> bool:
         """Whether one step and two halves lead to the same state; up to unstable growth, also
@@ -732,8 +741,14 @@ class EquilibriumPath:
         self, point: Point, control: DisplacementControl, by: float, kind: str
     ) -> Point | None:
         """The equilibrium at the value of a control, an increment [m] further than a point."""
+        key = id(point), kind, control.value
+        if key in self.failed:  # which keeps the point, and so its id
+            return None
         time = max(point.state.time, self.time) + self.tick
-        return point.step(time, control, self.imposed(point) + abs(by), kind)
+        end = point.step(time, control, self.imposed(point) + abs(by), kind)
+        if end is None:
+            self.failed[key] = point
+        return end
 
     # -- refinement of its highest level
     # ----------------------------------------------------------------------------------------------
@@ -882,7 +897,7 @@ class EquilibriumPath:
         if control is None:
             return []
         smallest = max(SMALLEST * length, self.negligible(a, control))
-        return self.along(a, control, length, smallest, b.control)
+        return self.along(a, control, length, smallest, b.control)[0]
 
 
 def deviation(change: float, predicted: float, least: float) -> float:

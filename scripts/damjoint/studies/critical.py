@@ -35,7 +35,6 @@ from .critical_words import (
     beyond_limit,
     by_increments,
     end_of_branch,
-    end_of_entering,
     events_on,
     falls_at_once,
     lost_beyond_limit,
@@ -297,10 +296,11 @@ class Search:
             result = replace(result, mode="sliding", why=slips_whole(path), doubt="")
         elif not result.why and path.falls:
             result = replace(result, why=lost_beyond_limit(path), doubt="")
-        elif not result.why and path.stops and path.entering:
-            result = replace(result, doubt=end_of_entering(path))
         elif not result.why and path.stops:
             result = replace(result, why=end_of_branch(path), doubt="")
+            if path.entering and certain:  # each point that the water reaches turns the path
+                other = self.from_beginning(path, share=1.0, case=lower_begin(path.case))
+                certain = other is None
         if path.begun_by_run and point is path.points[0]:
             result = replace(result, why="", doubt=falls_at_once(point))
         if path.water_withdraws:
@@ -328,14 +328,10 @@ class Search:
         another fall of the level as unstable growth, and of one that begins at a lower level; None
         if all lead to the same.
         """
-        first, *further = path.case.levels
-        levels = (LOWER_BEGIN * first, *(further or [first]))
-        tails = path.case.tail_levels if further else 2 * path.case.tail_levels
-        lower = varied(path.case, {}, levels, tails)
         falls = FALL / FALL_FACTOR, FALL * FALL_FACTOR
         ways: list[dict[str, Any]] = [{"share": SHORTER_RISE}]
         ways += [{"share": 1.0, "unstable_fall": fall} for fall in falls]
-        ways += [{"share": 1.0, "case": lower}]
+        ways += [{"share": 1.0, "case": lower_begin(path.case)}]
         paths = (self.from_beginning(path, **way) for way in ways)
         return next((other for other in paths if other), None)
 
@@ -602,6 +598,13 @@ class Search:
             f"computed level is {top.level:.6g} m"
         )
         return mode, why, joint
+
+
+def lower_begin(case: Case) -> Case:
+    """The case with a lower first level."""
+    first, *further = case.levels
+    levels = (LOWER_BEGIN * first, *(further or [first]))
+    return varied(case, {}, levels, case.tail_levels if further else 2 * case.tail_levels)
 
 
 def of_each(values: list[float]) -> Setting:

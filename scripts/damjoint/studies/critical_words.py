@@ -47,14 +47,6 @@ def end_of_branch(path: FailurePath) -> str:
     )
 
 
-def end_of_entering(path: FailurePath) -> str:
-    """What is said of a path that ends while water enters the crack."""
-    return (
-        "there the branch of equilibria ends, but water enters the crack at single points, each of "
-        "which turns the path: another path may lead to another level"
-    )
-
-
 def withdrawn(path: FailurePath) -> str:
     """What is said of a path on which the water leaves the crack."""
     return (

@@ -170,13 +170,11 @@ class FailurePath(EquilibriumPath):
             return not whole.differs(end, begin)
         return super().agree(begin, whole, middle, end)
 
-    def predicted(self, begin: Point, end: Point) -> bool:
-        """See `EquilibriumPath.predicted`."""
-        self.error = begin.prediction_error(end, max(self.highest, begin.level, end.level))
-        if self.error > 1 or (self.to_growth and end.leaps(begin)) or end.unloads(begin):
-            self.error = 0.0
-            return False
-        return True
+    def predictor_error(self, begin: Point, end: Point) -> float:
+        """See `EquilibriumPath.predictor_error`."""
+        if (self.to_growth and end.leaps(begin)) or end.unloads(begin):
+            return np.inf
+        return begin.prediction_error(end, max(self.highest, begin.level, end.level))
 
     def add(self, point: Point) -> None:
         """Append an equilibrium, if the toe is not crushed before it."""
