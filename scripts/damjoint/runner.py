@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -39,16 +39,20 @@ class RunProgress(Progress):
 
 
 def compute(case: Case, engine: str = "auto", fields: bool = True) -> Outcome:
-    """The outcome of a case with its first uplift alone; nothing is written.
+    """The outcome of a case with its first uplift alone; as `compute_scenes`."""
+    return next(compute_scenes(replace(case, also_uplift=()), engine, fields))
+
+
+def compute_scenes(case: Case, engine: str = "auto", fields: bool = True) -> Iterator[Outcome]:
+    """The outcome of each scene of a case; nothing is written.
 
     engine: see `engine_of`; fields: whether those of the bodies are needed. Raises InputError,
     RunError.
     """
-    single = replace(case, also_uplift=())
-    outcome = next(accuracy.solve(single, engine_of(single, engine), lambda *_: None, fields))
-    if outcome.error:
-        raise outcome.error
-    return outcome
+    for outcome in accuracy.solve(case, engine_of(case, engine), lambda *_: None, fields):
+        if outcome.error:
+            raise outcome.error
+        yield outcome
 
 
 def run(

@@ -125,6 +125,8 @@ def critical(measurements: Measurements) -> Table:
         search = Search(load("dam", coarse | settings), of)
         begin = time.perf_counter()
         answer = search.run()
+        if answer.error:
+            raise answer.error
         spent = time.perf_counter() - begin
         equilibria = sum(len(trial.path.points) for trial in search.trials)
         values = answer.value, answer.gravity, answer.mode, "yes" if answer.confirmed else "no"

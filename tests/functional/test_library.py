@@ -169,7 +169,7 @@ def test_frames_have_the_units_of_their_columns(run, quaked):
     )
     assert units["critical"]["value"] == units["sweep"]["critical_level"] == "m"
     assert (units["joint"]["time"], units["frames"]["time"]) == ("-", "s")
-    with pytest.raises(dj.InputError, match="table = curve: must be one of rows, history, joint"):
+    with pytest.raises(dj.InputError, match="table = curve: must be one of rows, joint, history"):
         quaked.to_pandas("curve")
 
 

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
+import numpy as np
+
 from .. import InputError, runner
 from ..input.case import Case
 from ..model.results import Results
 from ..python_words import speaks_python
 from .cases import as_case, noted
-from .tables import Tables, WithTables, by_column, displayed
+from .tables import Tables, WithTables, by_column, displayed, records
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class Checks(WithTables, Sequence["SafetyCheck"]):
-    """Safety checks, made by `check`: one for each case and joint.
+    """Safety checks, made by `check`: one for each case, uplift and joint.
 
     Of each check, `rows` are those of check.csv, `why` is the reason if it fails or is not judged,
     else empty, and `notes` are remarks on the result.
@@ -34,7 +36,7 @@ class Checks(WithTables, Sequence["SafetyCheck"]):
         [('usual', 'pass'), ('earthquake', 'fail')]
     """
 
-    #: of each case, its results and the checks of its joints
+    #: of each scene of each case, its results and the checks of its joints
     cases: Sequence[tuple[Results, list[SafetyCheck]]]
 
     @overload
@@ -59,7 +61,7 @@ class Checks(WithTables, Sequence["SafetyCheck"]):
         return {"rows": (by_column([row for check in self for row in check.rows]), CHECK)}
 
     def plot(self, number: int = 0) -> Figure:
-        """The picture of a case, by its number from 0, as `damjoint check` writes it.
+        """The picture of a case and uplift, by its number from 0, as `damjoint check` writes it.
 
         Raises InputError for a user's own geometry, which has none.
         """
@@ -72,6 +74,14 @@ class Checks(WithTables, Sequence["SafetyCheck"]):
                 f"case {result.case.name}: must be a section by parameters to be drawn"
             )
         return displayed(figure_of_check(picture_content(result, checks)))
+
+    def loads(self, number: int = 0) -> np.recarray:
+        """gravity.csv of a case and uplift, by its number from 0: loads of the gravity method on
+        the body above each joint; without rows for a user's own geometry.
+        """
+        from ..studies.check_study import hand_calculations, loads_table
+
+        return records(loads_table(hand_calculations(self.cases[number][0])))
 
     def __repr__(self) -> str:
         return "\n".join(map(repr, self))
@@ -101,5 +111,5 @@ def check(cases: Case | str | Path | Sequence[Case | str | Path]) -> Checks:
     combinations = [as_case(combination) for combination in listed]
     for combination in combinations:
         noted(combination)
-    results = [runner.compute(combination).result for combination in combinations]
-    return Checks([(result, compare_joints(result)) for result in results])
+    outcomes = [outcome for one in combinations for outcome in runner.compute_scenes(one)]
+    return Checks([(outcome.result, compare_joints(outcome.result)) for outcome in outcomes])

@@ -14,7 +14,7 @@ from ..input.case import Case
 from ..input.resolve import varied
 from ..python_words import all_in_python, speaks_python
 from .cases import as_case, as_list, noted, on_fixed_mesh
-from .tables import Tables, WithTables, displayed, records
+from .tables import Tables, WithTables, displayed, records, tables_of_run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -72,12 +72,15 @@ class Critical(WithTables):
 
     @property
     def by_name(self) -> Tables:
-        """The table equilibria."""
+        """The table equilibria; history and joint, up to the last equilibrium, if there is one."""
+        from ..studies.critical import last_state
         from ..studies.critical_study import table
         from ..studies.failure_path import critical_columns
 
         columns = critical_columns(self.search.case) | {"value": (self.search.unit.strip(), "")}
-        return {"equilibria": (table(self.search), columns)}
+        point = self.answer.point
+        of_run = tables_of_run(last_state(self.search, point)) if point else {}
+        return {"equilibria": (table(self.search), columns), **of_run}
 
     def __repr__(self) -> str:
         return "\n".join(self.statement)
@@ -114,6 +117,8 @@ def critical(
     from ..studies.critical import Search
 
     changed = varied(as_case(source), parameters, as_list(levels), as_list(tail_levels))
-    chosen = noted(changed)
-    search = Search(on_fixed_mesh(chosen), of)
-    return Critical(search.run(), search)
+    search = Search(on_fixed_mesh(noted(changed)), of)
+    answer = search.run()
+    if answer.error:
+        raise answer.error
+    return Critical(answer, search)

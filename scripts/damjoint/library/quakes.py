@@ -12,10 +12,10 @@ from .. import InputError
 from ..arrays import Array, Table
 from ..input.case import Case
 from ..input.resolve import with_record
-from ..model.results import MODES, history_columns, joint_columns, quake_columns
+from ..model.results import MODES, joint_columns, quake_columns
 from ..python_words import speaks_python
 from .cases import as_case, noted
-from .tables import JointTable, Tables, WithTables, displayed, records
+from .tables import JointTable, Tables, WithTables, displayed, records, tables_of_run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -105,15 +105,11 @@ class Quake(WithTables):
         """The tables rows, that of quake.csv: a row per time step; history, joint and, not by
         GetDP, frames.
         """
-        static, frames, case = self.tables.static, getattr(self.tables, "frames", None), self.case
-        joint = joint_columns(case)
-        in_time = {"frames": (frames.joint, joint | {"time": ("s", "")})} if frames else {}
-        return {
-            "rows": (self.tables.rows, quake_columns(case)),
-            "history": (static.history, history_columns(case)),
-            "joint": (static.joint, joint),
-            **in_time,
-        }
+        frames, case = getattr(self.tables, "frames", None), self.case
+        columns = joint_columns(case) | {"time": ("s", "")}
+        in_time = {"frames": (frames.joint, columns)} if frames else {}
+        rows = self.tables.rows, quake_columns(case)
+        return {"rows": rows, **tables_of_run(self.tables.static), **in_time}
 
     def __repr__(self) -> str:
         return f"{self.case.name}: {self.statement}"

@@ -16,7 +16,7 @@ from ..engines import Outcome
 from ..engines.condensed.solve import threads_of
 from ..input.case import Case
 from ..model.fields import Solution
-from ..model.results import Results, history_columns, joint_columns
+from ..model.results import Results
 from ..python_words import all_in_python, in_python, speaks_python
 from ..solver.load_stepper import LoadStepper
 from ..solver.state import State
@@ -25,7 +25,16 @@ from ..statics.statement import statement
 from ..statics.verdict import verdict
 from ..threads import limited_threads
 from .cases import as_case, noted
-from .tables import JointTable, Tables, WithTables, attributes, displayed, optional, records
+from .tables import (
+    JointTable,
+    Tables,
+    WithTables,
+    attributes,
+    displayed,
+    optional,
+    records,
+    tables_of_run,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -103,11 +112,7 @@ class Run(WithTables):
     @property
     def by_name(self) -> Tables:
         """The tables joint and history."""
-        results, case = self.results, self.case
-        return {
-            "joint": (results.joint, joint_columns(case)),
-            "history": (results.history, history_columns(case)),
-        }
+        return tables_of_run(self.results)
 
     def to_xarray(self, table: str = "joint") -> xarray.Dataset:
         """joint or history as a Dataset with units: dimensions time and node, or time.

@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import ROUND_OFF, InputError
 from ..arrays import Array, Value
-from ..model.results import Columns
+from ..model.results import Columns, Results, history_columns, joint_columns
 
 if TYPE_CHECKING:  # loaded when they are used, with what they draw with
     import pandas
@@ -112,6 +112,14 @@ class WithTables:
         data_frame = optional("pandas").DataFrame(dict(values))
         data_frame.attrs["units"] = {n: columns[n][0] for n in values if n in columns}
         return data_frame
+
+
+def tables_of_run(results: Results) -> Tables:
+    """The tables joint and history of a run."""
+    return {
+        "joint": (results.joint, joint_columns(results.case)),
+        "history": (results.history, history_columns(results.case)),
+    }
 
 
 def records(table: Mapping[str, Any]) -> np.recarray:

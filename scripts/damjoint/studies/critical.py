@@ -18,6 +18,7 @@ from scipy.optimize import bisect
 
 from .. import InputError
 from ..arrays import Setting
+from ..engines import engine_of
 from ..input.case import Case
 from ..input.parameters import independent, parameter
 from ..input.resolve import resolve, varied
@@ -127,8 +128,9 @@ class Search:
         self.check_quantity()
 
     def check_quantity(self) -> None:
-        """Raise InputError if the case has nothing to vary."""
+        """Raise InputError if the case has nothing to vary, or no engine can compute it."""
         case = self.case
+        engine_of(case, "auto")
         if case.stores_water:
             raise InputError(
                 f"time_unit = {case['time_unit']:g}: must be 0 in the search of a critical value, "
@@ -240,10 +242,15 @@ class Search:
     # ----------------------------------------------------------------------------------------------
 
     def run(self) -> CriticalValue:
-        """Search, and compare with the gravity method."""
-        with limited_threads(1):
-            result = self.find()
-            return self.gravity.beside(result, self.trials[-1].path.points)
+        """Search, and compare with the gravity method; nothing is written. An error or interrupt
+        that ended the search is in the result.
+        """
+        try:
+            with limited_threads(1):
+                result = self.find()
+                return self.gravity.beside(result, self.trials[-1].path.points)
+        except BaseException as error:
+            return self.ended_early(error)
 
     def find(self) -> CriticalValue:
         """Search, without the values of the gravity method."""

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from .. import RunError
-from ..engines import engine_of
 from ..engines.condensed.recover import recover
 from ..engines.condensed.solve import about
 from ..fem.bodies import Bodies
@@ -46,15 +45,11 @@ def critical(
     trials.
     Raises InputError, RunError.
     """
-    engine_of(case, "auto")
     search = Search(replace(case, all_steps=bool(sensitivity)), of)
     with session(search.case, out or Path("out") / f"{case.name}_critical") as study:
         with preparation(search.case) as shown:
             search.on_progress = lambda message: shown.describe(f"{case.name}: {message}")
-            try:
-                answer = search.run()
-            except BaseException as caught:
-                answer = search.ended_early(caught)
+            answer = search.run()
         save(study, search, answer)
         if answer.error:
             raise answer.error

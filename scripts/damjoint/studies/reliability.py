@@ -247,11 +247,11 @@ class CriticalLevels:
         case: Case,
         variables: Variables,
         jobs: int | None = 1,
-        scheduler: str | None = None,
+        client: Any = None,
         known: Mapping[str, Mapping[str, Value]] | None = None,
     ) -> None:
-        """jobs, scheduler: as in a sweep; known: rows by key, of an earlier study."""
-        self.case, self.variables, self.jobs, self.scheduler = case, variables, jobs, scheduler
+        """jobs, client: see `spread_bundles`; known: rows by key, of an earlier study."""
+        self.case, self.variables, self.jobs, self.client = case, variables, jobs, client
         self.known = {**(known or {})}
         #: number of levels that were computed; rows that this study has used, by key
         self.computed, self.used = 0, dict[str, Mapping[str, Value]]()
@@ -328,7 +328,7 @@ class CriticalLevels:
         if tasks:
             interface_of(next(iter(tasks.values()))[0])  # condensed before the processes start
             jobs, work = number_of(self.jobs, len(tasks)), [[key] for key in tasks]
-            for key, result in spread_bundles(rows_of, work, tasks, jobs, self.scheduler):
+            for key, result in spread_bundles(rows_of, work, tasks, jobs, self.client):
                 self.computed += 1
                 self.on_row(key, joint, values_of[key], result)
                 # as the file has it: a study that continues takes the same points

@@ -56,13 +56,12 @@ def reliability(
     openturns()
     check_jobs(jobs)
     variables.normal()
-    if scheduler:
-        client_of(scheduler).close()
     rows, columns = out / ROWS, columns_of(variables)
-    with session(case, out, keep=of_same_columns(rows, columns)) as study:
+    keep = of_same_columns(rows, columns)
+    with client_of(scheduler) as client, session(case, out, keep) as study:
         numeric = [c for c in columns if c in ("critical_level", "confirmed")]
         with result_file(rows, columns, numeric) as (file, known):
-            levels = CriticalLevels(case, variables, jobs, scheduler, known)
+            levels = CriticalLevels(case, variables, jobs, client, known)
             with Progress(case.name, bar_format="{desc} {elapsed}", leave=False) as shown:
                 doing = ""
 

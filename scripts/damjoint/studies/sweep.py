@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -247,11 +248,16 @@ def spread(
     tasks: dict[str, Task], jobs: int, scheduler: str | None
 ) -> Iterator[tuple[str, dict[str, Value]]]:
     """(key, row) of each finished task of a sweep, see `spread_bundles`."""
-    return spread_bundles(last_rows, bundles(tasks), tasks, jobs, scheduler)
+    with client_of(scheduler) as client:
+        yield from spread_bundles(last_rows, bundles(tasks), tasks, jobs, client)
 
 
-def client_of(scheduler: str) -> Any:
-    """A client of dask of a scheduler at an address. Raises InputError."""
+def client_of(scheduler: str | None) -> Any:
+    """A client of dask of a scheduler at an address, None without one, as a context. Raises
+    InputError.
+    """
+    if not scheduler:
+        return contextlib.nullcontext()
     try:
         from dask.distributed import Client
     except ImportError:
@@ -271,29 +277,27 @@ def spread_bundles(
     work: list[list[str]],
     tasks: Mapping[str, Any],
     jobs: int,
-    scheduler: str | None,
+    client: Any,
 ) -> Iterator[tuple[str, dict[str, Value]]]:
-    """(key, row) of each finished task: in this process, in `jobs` processes, or by a scheduler.
+    """(key, row) of each finished task: in this process, in `jobs` processes, or by a client.
 
     rows_of: the rows of the tasks of a bundle; work: the keys of each bundle. Raises InputError,
     RunError.
     """
     chosen = [[tasks[key] for key in keys] for keys in work]
-    if scheduler:
-        with client_of(scheduler) as client:
-            from dask.distributed import as_completed
+    if client:
+        from dask.distributed import as_completed
 
-            threads = max(sum(client.nthreads().values()), 1)
-            size = min(max(len(work) // (TASKS_PER_THREAD * threads), 1), MOST_IN_TASK)
-            futures = {}
-            for i in range(0, len(work), size):
-                keys = list(chain.from_iterable(work[i : i + size]))
-                name = f"damjoint-{hashlib.sha256(' '.join(keys).encode()).hexdigest()[:32]}"
-                futures[client.submit(rows_of_bundles, rows_of, chosen[i : i + size], key=name)] = (
-                    keys
-                )
-            for future in as_completed(futures):
-                yield from zip(futures[future], future.result(), strict=True)
+        threads = max(sum(client.nthreads().values()), 1)
+        size = min(max(len(work) // (TASKS_PER_THREAD * threads), 1), MOST_IN_TASK)
+        futures = {}
+        for i in range(0, len(work), size):
+            keys = list(chain.from_iterable(work[i : i + size]))
+            name = f"damjoint-{hashlib.sha256(' '.join(keys).encode()).hexdigest()[:32]}"
+            future = client.submit(rows_of_bundles, rows_of, chosen[i : i + size], key=name)
+            futures[future] = keys
+        for future in as_completed(futures):
+            yield from zip(futures[future], future.result(), strict=True)
     elif jobs == 1 or len(work) == 1:
         for keys, some in zip(work, chosen, strict=True):
             yield from zip(keys, rows_of(some), strict=True)
