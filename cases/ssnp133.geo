@@ -1,11 +1,11 @@
 // Mesh of ssnp133.case.
-// Made by python -m damjoint_tools.gmsh_files ssnp133.case, for dim = 2.
 Include "../pro/units.pro";
 Include "ssnp133.case";
+// Made by python -m damjoint_tools.gmsh_files, for dim = 2.
 Include "../geo/window.geo";
 Include "../geo/ssnp133.geo";
 If(dim != 2)
-  Error("dim = %g: must be 2, as in ssnp133.case", dim);
+  Error("dim = %g: must be 2, as the regions in this file", dim);
 EndIf
 Mesh.MshFileVersion = 2.2;
 Delete Physicals;

@@ -1,25 +1,4 @@
 // Mesh of ssnp143c_friction.case.
-// Made by python -m damjoint_tools.gmsh_files ssnp143c_friction.case, for dim = 2.
 Include "../pro/units.pro";
 Include "ssnp143c_friction.case";
-Include "../geo/window.geo";
-Include "../geo/pressed.geo";
-If(dim != 2)
-  Error("dim = %g: must be 2, as in ssnp143c_friction.case", dim);
-EndIf
-Mesh.MshFileVersion = 2.2;
-Delete Physicals;
-Physical Point(7) = {4};
-Physical Point(8) = {1};
-Physical Point(9) = {6};
-Physical Point(1007) = {5};
-Physical Point(1008) = {2};
-Physical Point(2007) = {3};
-Physical Point(2008) = {6};
-Physical Curve(3) = {1};
-Physical Curve(6) = {12 : 14};
-Physical Curve(1003) = {2};
-Physical Curve(2003) = {3};
-Physical Surface(1) = {1};
-Physical Surface(2) = {3};
-Physical Surface(1001) = {2};
+Include "ssnp143c_regions.geo";

@@ -1,11 +1,11 @@
 // Mesh of stepped.case.
-// Made by python -m damjoint_tools.gmsh_files stepped.case, for dim = 2.
 Include "../pro/units.pro";
 Include "stepped.case";
+// Made by python -m damjoint_tools.gmsh_files, for dim = 2.
 Include "../geo/window.geo";
 Include "../geo/stepped.geo";
 If(dim != 2)
-  Error("dim = %g: must be 2, as in stepped.case", dim);
+  Error("dim = %g: must be 2, as the regions in this file", dim);
 EndIf
 Mesh.MshFileVersion = 2.2;
 Delete Physicals;

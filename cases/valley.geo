@@ -1,11 +1,11 @@
 // Mesh of valley.case.
-// Made by python -m damjoint_tools.gmsh_files valley.case, for dim = 3.
 Include "../pro/units.pro";
 Include "valley.case";
+// Made by python -m damjoint_tools.gmsh_files, for dim = 3.
 Include "../geo/window.geo";
 Include "../geo/valley.geo";
 If(dim != 3)
-  Error("dim = %g: must be 3, as in valley.case", dim);
+  Error("dim = %g: must be 3, as the regions in this file", dim);
 EndIf
 Mesh.MshFileVersion = 2.2;
 Delete Physicals;

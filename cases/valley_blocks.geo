@@ -1,11 +1,11 @@
 // Mesh of valley_blocks.case.
-// Made by python -m damjoint_tools.gmsh_files valley_blocks.case, for dim = 3.
 Include "../pro/units.pro";
 Include "valley_blocks.case";
+// Made by python -m damjoint_tools.gmsh_files, for dim = 3.
 Include "../geo/window.geo";
 Include "../geo/valley_blocks.geo";
 If(dim != 3)
-  Error("dim = %g: must be 3, as in valley_blocks.case", dim);
+  Error("dim = %g: must be 3, as the regions in this file", dim);
 EndIf
 Mesh.MshFileVersion = 2.2;
 Delete Physicals;

@@ -12,9 +12,8 @@ from damjoint.input.resolve import load
 
 
 def main() -> None:
-    """Write the files of the cases that are named."""
-    for name in sys.argv[1:]:
-        write_gmsh_files(load(name), Path(name).parent)
+    """Write the files of the cases that are named, beside the first one."""
+    write_gmsh_files([load(name) for name in sys.argv[1:]], Path(sys.argv[1]).parent)
 
 
 if __name__ == "__main__":

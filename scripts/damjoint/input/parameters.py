@@ -9,7 +9,7 @@ import re
 import signal
 import threading
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -422,8 +422,13 @@ def quoted(value: Value) -> str:
 
 
 def listing(name: str, values: Iterable[float]) -> str:
-    """A list in that language, a long one with a number a line: GetDP's parser fails on lines of
-    some thousand characters.
+    """A list in that language."""
+    return f"{name}() = {{{in_rows([repr(float(v)) for v in values])}}};\n"
+
+
+def in_rows(texts: Sequence[str], number: int = 8, separator: str = ",") -> str:
+    """Texts of that language, a number of them on each line: GetDP's parser fails on lines of some
+    thousand characters.
     """
-    numbers = [repr(float(v)) for v in values]
-    return f"{name}() = {{" + (", " if len(numbers) <= 3 else ",\n").join(numbers) + "};\n"
+    rows = (texts[i : i + number] for i in range(0, len(texts), number))
+    return f"{separator}\n".join(f"{separator} ".join(row) for row in rows)

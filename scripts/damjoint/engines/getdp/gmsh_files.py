@@ -9,6 +9,7 @@ but for the means over a curved heel or toe.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TypeAlias
 
@@ -28,37 +29,55 @@ ENTITIES = "Point", "Curve", "Surface", "Volume"
 #: Entities of the regions, by dimension and number.
 Regions: TypeAlias = dict[tuple[int, int], list[int]]
 
-MADE = "// Made by python -m damjoint_tools.gmsh_files {name}.case, for dim = {dim}.\n"
+MADE = "// Made by python -m damjoint_tools.gmsh_files, for dim = {dim}.\n"
 
 
-def write_gmsh_files(case: Case, folder: Path) -> None:
-    """Write NAME.geo and NAME.pro of a case into the folder of its file.
+def write_gmsh_files(cases: Sequence[Case], folder: Path) -> None:
+    """Write NAME.geo and NAME.pro of cases into the folder of their files; regions or joints that
+    several of them have alike into NAME_regions.geo and NAME_joints.pro of the first one.
 
-    Raises InputError if its geometry is not a .geo file, or GetDP can not compute it.
+    Raises InputError if a geometry is not a .geo file, or GetDP can not compute it.
     """
-    geometry = case.geometry
-    if not geometry or geometry.suffix != ".geo":
-        raise InputError(f"geometry = {geometry}: must be a .geo file")
-    check(case)
-    mesh = mesh_of(case)
-    case = case.with_joints([joint.of_case for joint in mesh.joints])
-    (folder / f"{case.name}.geo").write_text(geo_text(case.name, geometry, mesh))
-    (folder / f"{case.name}.pro").write_text(pro_text(case, mesh))
+    texts = dict[str, tuple[str, str]]()
+    for case in cases:
+        geometry = case.geometry
+        if not geometry or geometry.suffix != ".geo":
+            raise InputError(f"geometry = {geometry}: must be a .geo file")
+        check(case)
+        mesh = mesh_of(case)
+        case = case.with_joints([joint.of_case for joint in mesh.joints])
+        texts[case.name] = regions_text(geometry, mesh), joints_text(case, mesh)
+    for name, both in texts.items():
+        for kind, text in zip(("regions.geo", "joints.pro"), both, strict=True):
+            alike = [n for n, others in texts.items() if text in others]
+            if len(alike) > 1:
+                shared = f"{alike[0]}_{kind}"
+                (folder / shared).write_text(text)
+                text = f'Include "{shared}";\n'
+            path = folder / f"{name}{Path(kind).suffix}"
+            path.write_text(HEADS[path.suffix].format(name=name) + text + TAILS[path.suffix])
 
 
-def geo_text(name: str, geometry: Path, mesh: Mesh) -> str:
-    """NAME.geo: the geometry, and its regions by the numbers of pro/parameters.pro."""
+#: What stands before and behind regions or joints in NAME.geo and NAME.pro.
+HEADS = {
+    ".geo": '// Mesh of {name}.case.\nInclude "../pro/units.pro";\nInclude "{name}.case";\n',
+    ".pro": "// Problem of {name}.case.\n"
+    'out_dir = StrCat[CurrentDirectory, "res/{name}/"];\n'
+    'Include "../pro/units.pro";\nInclude "{name}.case";\n',
+}
+TAILS = {".geo": "", ".pro": 'Include "../pro/damjoint.pro";\n'}
+
+
+def regions_text(geometry: Path, mesh: Mesh) -> str:
+    """The geometry, and its regions by the numbers of pro/parameters.pro."""
     regions, inverse = regions_of(mesh)
     turned = sorted(inverse.difference(*turned_joints(regions, inverse, mesh).values()))
     return (
-        f"// Mesh of {name}.case.\n"
-        + MADE.format(name=name, dim=mesh.dim)
-        + 'Include "../pro/units.pro";\n'
-        + f'Include "{name}.case";\n'
+        MADE.format(dim=mesh.dim)
         + 'Include "../geo/window.geo";\n'
         + f'Include "../geo/{geometry.name}";\n'
         + f"If(dim != {mesh.dim})\n"
-        + f'  Error("dim = %g: must be {mesh.dim}, as in {name}.case", dim);\n'
+        + f'  Error("dim = %g: must be {mesh.dim}, as the regions in this file", dim);\n'
         + "EndIf\n"
         + "Mesh.MshFileVersion = 2.2;\n"
         + "Delete Physicals;\n"
@@ -70,8 +89,8 @@ def geo_text(name: str, geometry: Path, mesh: Mesh) -> str:
     )
 
 
-def pro_text(case: Case, mesh: Mesh) -> str:
-    """NAME.pro: position of the joints, and the problem definition."""
+def joints_text(case: Case, mesh: Mesh) -> str:
+    """Position of the joints, and paths of the water."""
     inverse = turned_joints(*regions_of(mesh), mesh)
     lists = "".join(listing(name, values) for name, values in user_lists(mesh).items())
     joints = "".join(
@@ -80,17 +99,7 @@ def pro_text(case: Case, mesh: Mesh) -> str:
         )
         for k, path in enumerate(values_of_paths(mesh, case))
     )
-    return (
-        f"// Problem of {case.name}.case.\n"
-        + MADE.format(name=case.name, dim=mesh.dim)
-        + f'out_dir = StrCat[CurrentDirectory, "res/{case.name}/"];\n'
-        + 'Include "../pro/units.pro";\n'
-        + f'Include "{case.name}.case";\n'
-        + rounded(lists)
-        + user_names(mesh)
-        + rounded(joints)
-        + 'Include "../pro/damjoint.pro";\n'
-    )
+    return MADE.format(dim=mesh.dim) + rounded(lists) + user_names(mesh) + rounded(joints)
 
 
 def turned_joints(regions: Regions, turned: set[int], mesh: Mesh) -> dict[int, list[int]]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ... import ROUND_OFF, InputError
 from ...input.case import Case
-from ...input.parameters import listing
+from ...input.parameters import in_rows, listing
 from ...mesh.joint_mesh import JointMesh
 from ...mesh.mesh import Mesh
 from ...model.network import HigherHeel, Network, PathDrains, WaterPath, networks_of, plane_paths
@@ -67,8 +67,8 @@ def has_level_ends(joint: JointMesh) -> bool:
 
 
 def lines(values: dict[str, float]) -> str:
-    """Lines of GetDP's language that set values."""
-    return "".join(f"{name} = {value!r};\n" for name, value in values.items())
+    """Lines of GetDP's language that set values, four on each."""
+    return in_rows([f"{name} = {value!r};" for name, value in values.items()], 4, "") + "\n"
 
 
 def refused(network: Network, mesh: Mesh, case: Case, why: str) -> InputError:

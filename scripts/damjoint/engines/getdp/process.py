@@ -17,7 +17,7 @@ import numpy as np
 
 from ... import InputError, RunError, data
 from ...input.case import Case
-from ...input.parameters import assignments, constants, declared, listing, quoted
+from ...input.parameters import assignments, constants, declared, in_rows, listing, quoted
 from ...input.scene import LINES, SIDES, TRACTION
 from ...mesh.chord import Chord
 from ...mesh.joint_mesh import heel_normal
@@ -119,7 +119,7 @@ def numbers(mesh: Mesh) -> dict[str, float]:
 
 def user_names(mesh: Mesh) -> str:
     """The list of pro/joints.pro with the names of the joints of a user's own geometry."""
-    names = ",\n".join(quoted(joint.name) for joint in mesh.joints)
+    names = in_rows([quoted(joint.name) for joint in mesh.joints], 4)
     return f"own_joint_names() = Str[{names}];\n"
 
 
