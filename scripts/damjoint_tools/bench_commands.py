@@ -196,15 +196,15 @@ def measure_quake(settings: dict[str, Any], span: float) -> tuple[Any, ...]:
     columns = quake.system.size, number, 1e3 * each, set_up / each, quake.halvings, spent
     if not np.isfinite(span):
         return *columns, "", "", ""
-    found = getdp_quake.solve(quake.case, quake.record, quake.damping, quake.dt, lambda _time: None)
-    if found.error:
-        raise found.error
-    by_getdp = found.seconds["earthquake"] / len(found.rows["time"])
-    difference = np.abs(found.rows["slip_mean"] - slip).max() / np.abs(slip).max()
+    other = getdp_quake.solve(quake.case, quake.record, quake.damping, quake.dt, lambda _time: None)
+    if other.error:
+        raise other.error
+    by_getdp = other.seconds["earthquake"] / len(other.rows["time"])
+    difference = np.abs(other.rows["slip_mean"] - slip).max() / np.abs(slip).max()
     return *columns, 1e3 * by_getdp, by_getdp / each, difference
 
 
 def first_part(record: Record, span: float) -> Record:
     """A record up to a time [s]."""
-    kept = record.times <= span
-    return Record(record.times[kept], record.acceleration[kept])
+    shown = record.times <= span
+    return Record(record.times[shown], record.acceleration[shown])

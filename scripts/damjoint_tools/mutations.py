@@ -45,8 +45,8 @@ def having(name: str, *values: object) -> Callable[[RandomScene], bool]:
 
     def matters(scene: RandomScene) -> bool:
         value = scene.settings.get(name, 0)
-        found = value if isinstance(value, tuple) else (value,)
-        return any(v in values if values else v for v in found)
+        values_of_joints = value if isinstance(value, tuple) else (value,)
+        return any(v in values if values else v for v in values_of_joints)
 
     return matters
 
@@ -321,16 +321,16 @@ def look_for(mutation: Mutation, seed: int) -> dict[str, object]:
             out.mkdir()
             try:
                 run = run_of(scene, out, fields=mutation.fields)
-                found = run.violations()
+                findings = run.violations()
                 wrong, remark = run.stop() if run.files.stopped else (False, "")
-                found += [remark] if wrong else []
+                findings += [remark] if wrong else []
             except RunError as error:
                 if str(error).startswith(REFUSED):
                     raise
-                found = [str(error)]
+                findings = [str(error)]
             shutil.rmtree(out)
-            if found:
-                return row | {"scene": scene_name, "finding": found[0]}
+            if findings:
+                return row | {"scene": scene_name, "finding": findings[0]}
     return row
 
 

@@ -256,9 +256,9 @@ def validation_pages() -> None:
     (REFERENCE / "published.md").write_text("\n\n".join(others) + "\n")
     lines = []
     for family, shows in FAMILIES.items():
-        own = rows[family]
-        passed = sum(c.verdict == "pass" for c in own)
-        lines.append((family.upper(), shows, len(own), passed, f"{worst(own):.0%}"))
+        comparisons = rows[family]
+        passed = sum(c.verdict == "pass" for c in comparisons)
+        lines.append((family.upper(), shows, len(comparisons), passed, f"{worst(comparisons):.0%}"))
     heads = "family", "shows", "rows", "passed", "worst, of its tolerance"
     readme = Path("README.md")
     readme.write_text(between("families", readme.read_text(), markdown(lines, heads)))
@@ -271,11 +271,11 @@ def quake_conventions(published: list[Comparison]) -> str:
     from damjoint.post.validation import compare_steps, last_time
     from damjoint.verification.quake_tests import follow, sdnv138
 
-    own: dict[Reference, Comparison] = {}
+    by_package: dict[Reference, Comparison] = {}
     for name, test in sdnv138().items():
         test = replace(test, settings={**test.settings, **OWN_CONVENTIONS})
         columns = follow(test, last_time("sdnv138"))
-        own |= {c.reference: c for c in compare_steps("sdnv138", name, columns)}
+        by_package |= {c.reference: c for c in compare_steps("sdnv138", name, columns)}
     lines = [
         (
             c.reference.modeling,
@@ -283,8 +283,8 @@ def quake_conventions(published: list[Comparison]) -> str:
             f"{c.reference.value:.6g}",
             f"{c.computed:.6g}",
             f"{100 * c.difference:+.3f} %",
-            f"{own[c.reference].computed:.6g}",
-            f"{100 * own[c.reference].difference:+.2f} %",
+            f"{by_package[c.reference].computed:.6g}",
+            f"{100 * by_package[c.reference].difference:+.2f} %",
         )
         for c in published
     ]

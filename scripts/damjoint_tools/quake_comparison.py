@@ -61,27 +61,27 @@ Checked: TypeAlias = tuple[dict[str, float], list[str]]
 
 def further_checks(scene: RandomQuake, run: Shaken, again: Again) -> Checked:
     """Return the numbers of all checks of a scene, and the rules that they violate."""
-    measures, found = dict[str, float](), list[str]()
+    measures, findings = dict[str, float](), list[str]()
     for check in scene.checks:
         numbers, violated = CHECK_BY_NAME[check](scene, run, again)
         measures |= numbers
-        found += violated
+        findings += violated
     for name in TOLERANCES.keys() & measures:
         if not measures[name] <= TOLERANCES[name]:
-            found.append(f"{name}: {measures[name]:.3g}, {MEASURES[name]}")
-    return measures, found
+            findings.append(f"{name}: {measures[name]:.3g}, {MEASURES[name]}")
+    return measures, findings
 
 
 def equations(scene: RandomQuake, run: Shaken, again: Again) -> Checked:
     """Check the equations of all unknowns at each step, and the balance of energy."""
-    found = quake_equations.measures(scene.case)
-    measures = {"residual": found["residual"], "energy_lost": found["lost"]}
+    numbers = quake_equations.measures(scene.case)
+    measures = {"residual": numbers["residual"], "energy_lost": numbers["lost"]}
     violated = []
-    if not found["residual"] <= quake_equations.RESIDUAL_TOLERANCE:
-        violated.append(f"equations: residual {found['residual']:.3g} of the static loads")
+    if not numbers["residual"] <= quake_equations.RESIDUAL_TOLERANCE:
+        violated.append(f"equations: residual {numbers['residual']:.3g} of the static loads")
     conserves = run.values["hht_alpha"] == 0
     room = quake_equations.ENERGY_TOLERANCE
-    lost, rise = found["lost"], found["rise"]
+    lost, rise = numbers["lost"], numbers["rise"]
     if not lost >= -room or (conserves and not (lost <= room and rise <= room)):
         violated.append(f"energy: {lost:.3g} lost, {rise:.3g} gained at rest of the ground")
     return measures, violated

@@ -324,9 +324,9 @@ def of_joints(drawn: list[Drawn]) -> Drawn:
     """Return the settings of OF_JOINTS with a value for each joint, by default that of its
     declaration.
     """
-    names = [n for n in OF_JOINTS if any(n in own for own in drawn)]
+    names = [n for n in OF_JOINTS if any(n in joint for joint in drawn)]
     default = {name: declared()[name].default for name in names}
-    return {n: tuple(own.get(n, default[n]) for own in drawn) for n in names}
+    return {n: tuple(joint.get(n, default[n]) for joint in drawn) for n in names}
 
 
 def slender_dam(rng: RandomNumbers, height: float) -> Drawn:

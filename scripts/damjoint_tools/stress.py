@@ -156,9 +156,9 @@ def with_further_checks(
     def again(changed: RandomQuake, *options: str) -> Shaken:
         return run_of(changed, folder, *options, name=f"again_{next(runs)}").shaken
 
-    measures, found = further_checks(scene, run.shaken, again)
+    measures, findings = further_checks(scene, run.shaken, again)
     numbers: dict[str, object] = {name: f"{v:.3g}" for name, v in measures.items()}
-    return numbers | {"class": DEFECT if found else VERIFIED, "findings": "; ".join(found)}
+    return numbers | {"class": DEFECT if findings else VERIFIED, "findings": "; ".join(findings)}
 
 
 def computed_again(
@@ -169,19 +169,19 @@ def computed_again(
     """
     if row["class"] == DEFECT:
         return {}
-    found, numbers = list[object](), dict[str, Any]()
+    findings, numbers = list[object](), dict[str, Any]()
     if row["class"] == VERIFIED:
         doubled = run_of(replace(scene, steps=2 * scene.steps), folder, name="doubled").files
-        found += again.other_steps(run.asked, run.files, doubled)
+        findings += again.other_steps(run.asked, run.files, doubled)
         if not doubled.stopped:
             numbers["steps_difference"] = again.difference(run.files, doubled)
     case = scene.case
     if case["dim"] == 2 and not again.follows_history(run.asked, first_step=False):
         more, differences = critical_levels(scene, case["dam_height"], folder)
-        found, numbers = [*found, *more], numbers | differences
-    if found:
-        found = [text for text in (row["findings"], *found) if text]
-        return numbers | {"class": DEFECT, "findings": "; ".join(map(str, found))}
+        findings, numbers = [*findings, *more], numbers | differences
+    if findings:
+        findings = [text for text in (row["findings"], *findings) if text]
+        return numbers | {"class": DEFECT, "findings": "; ".join(map(str, findings))}
     return {name: f"{value:.8g}" for name, value in numbers.items()}
 
 
@@ -203,17 +203,17 @@ def critical_levels(
     starts = [search(f"critical_{part:g}", part * first.level) for part in again.STARTS]
     results = [first, *filter(None, starts)]
     levels = [result.level for result in results if result.confirmed]
-    found, numbers = list(again.starts(results)), {"critical_level": first.level}
+    findings, numbers = list(again.starts(results)), {"critical_level": first.level}
     if len(levels) > 1:
         numbers["critical_difference"] = (max(levels) - min(levels)) / max(levels)
     if first.confirmed:
         below = run_of(rising(again.BELOW * first.level), folder, name="below", fields=True)
-        found += [f"below the critical level: {text}" for text in below.violations()]
+        findings += [f"below the critical level: {text}" for text in below.violations()]
         if below.files.stopped:
-            found.append(f"no equilibrium at {again.BELOW:g} of the critical level")
+            findings.append(f"no equilibrium at {again.BELOW:g} of the critical level")
         else:
-            found += again.above(first, below.files, below.asked, below.steps)
-    return found, numbers
+            findings += again.above(first, below.files, below.asked, below.steps)
+    return findings, numbers
 
 
 def verified(run: Witness) -> dict[str, object]:

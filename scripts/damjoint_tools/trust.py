@@ -264,11 +264,11 @@ def classes(rows: list[Row], *names: str, with_words: dict[str, str] | None = No
     for name in names:
         values = sorted({row[name] for row in rows if "," not in row[name]})
         for value in values:
-            own = [row for row in rows if row[name] == value]
-            lines.append((f"{name} = {value}", *counts(own).values()))
+            selected = [row for row in rows if row[name] == value]
+            lines.append((f"{name} = {value}", *counts(selected).values()))
     for words, part in (with_words or {}).items():
-        own = [row for row in rows if part in row["command"]]
-        lines.append((words, *counts(own).values()))
+        selected = [row for row in rows if part in row["command"]]
+        lines.append((words, *counts(selected).values()))
     lines.append(("all", *counts(rows).values()))
     return markdown(lines, ("scenes", *CLASSES))
 
@@ -292,8 +292,8 @@ def measured(rows: list[Row]) -> str:
     lines: list[tuple[Any, ...]] = []
     for name, meaning in MEASURES.items():
         for words, chosen in parts.get(name, (("", lambda row: True),)):
-            own = [row for row in rows if row.get(name) and chosen(row)]
-            values = np.array([float(row[name]) for row in own])
+            selected = [row for row in rows if row.get(name) and chosen(row)]
+            values = np.array([float(row[name]) for row in selected])
             if len(values):
                 low, middle, high = np.percentile(values, [0, 50, 100])
                 cells = (f"{value:.2g}" for value in (low, middle, high))

@@ -98,8 +98,8 @@ def read_one(path: Path) -> RecordFile:
     if any(map(PEER.search, lines[:4])):
         return read_peer(name, lines)
     for number, line in enumerate(lines):
-        if found := COSMOS.match(line):
-            return read_cosmos(name, lines, number, found)
+        if match := COSMOS.match(line):
+            return read_cosmos(name, lines, number, match)
     return read_csv(name, lines)
 
 
@@ -107,24 +107,24 @@ def read_peer(name: str, lines: list[str]) -> RecordFile:
     """The rows of the lines of a file of PEER, in g."""
     for number, line in enumerate(lines[:8], start=1):
         for sizes in PEER_SIZES:
-            if found := sizes.search(line):
+            if match := sizes.search(line):
                 words = [
                     (n, w) for n, row in enumerate(lines[number:], number + 1) for w in row.split()
                 ]
-                dt = number_of(name, number, found["dt"])
-                return of_values(name, words, int(found["n"]), dt, STANDARD_GRAVITY)
+                dt = number_of(name, number, match["dt"])
+                return of_values(name, words, int(match["n"]), dt, STANDARD_GRAVITY)
     raise InputError(f"{name}: must have NPTS and DT in its fourth line, as files of PEER have")
 
 
-def read_cosmos(name: str, lines: list[str], number: int, found: re.Match[str]) -> RecordFile:
+def read_cosmos(name: str, lines: list[str], number: int, form: re.Match[str]) -> RecordFile:
     """The rows of the lines of a COSMOS file whose line of this number says how they are written.
 
     Its first component only. Raises InputError.
     """
-    unit = COSMOS_UNITS.get(found["unit"].strip().lower())
+    unit = COSMOS_UNITS.get(form["unit"].strip().lower())
     if unit is None:
         raise InputError(
-            f"{name}, row {number + 1}: units = {found['unit'].strip()}: must be accelerations in "
+            f"{name}, row {number + 1}: units = {form['unit'].strip()}: must be accelerations in "
             f"{', '.join(COSMOS_UNITS)}"
         )
     header = list[str]()
@@ -132,10 +132,10 @@ def read_cosmos(name: str, lines: list[str], number: int, found: re.Match[str]) 
         if head := COSMOS_HEADER.match(line):
             rows = -(-int(head["n"]) // int(head["columns"]))
             header = [w for row in lines[k + 1 : k + 1 + rows] for w in cells(row, head["width"])]
-    count, seconds = int(found["n"]), float(found["seconds"])
-    for place, size in COSMOS_INTERVALS:
+    count, seconds = int(form["n"]), float(form["seconds"])
+    for index, size in COSMOS_INTERVALS:
         with contextlib.suppress(IndexError, ValueError):
-            dt = float(header[place]) * size
+            dt = float(header[index]) * size
             # the duration is rounded to a second
             if dt > 0 and abs(count * dt - seconds) <= 1 + dt:
                 break
@@ -147,7 +147,7 @@ def read_cosmos(name: str, lines: list[str], number: int, found: re.Match[str]) 
     values = [
         (n, word)
         for n, row in enumerate(lines[number + 1 :], number + 2)
-        for word in cells(row, found["width"])
+        for word in cells(row, form["width"])
     ]
     return of_values(name, values, count, dt, unit)
 

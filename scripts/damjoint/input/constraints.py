@@ -323,9 +323,9 @@ def check_joints_on_face(
     for section in sections:
         x0, y0, x1, y1 = (section[name][0] for name in ("heel_x", "heel_y", "toe_x", "toe_y"))
         for x, y in downstream_corners(case, face):
-            beyond = (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)  # > 0: above the line
+            side = (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)  # > 0: above the line
             near = LEAST_LENGTH * case["dam_height"]
-            if abs(y - y1) > near and (y > y1) != (beyond > near * (x1 - x0)):
+            if abs(y - y1) > near and (y > y1) != (side > near * (x1 - x0)):
                 listed = ",".join(f"{v:g}" for v in face)
                 raise InputError(
                     f"downstream_face = {listed}: its corner at ({x:g}, {y:g}) must be "

@@ -183,7 +183,7 @@ def complete(text: str, folder: Path) -> str:
     """A text with the files that it includes, of absolute paths or relative to a folder, in place
     of the lines that include them: Gmsh does not close such files.
     """
-    return re.sub(INCLUDED, lambda found: complete((folder / found[1]).read_text(), folder), text)
+    return re.sub(INCLUDED, lambda match: complete((folder / match[1]).read_text(), folder), text)
 
 
 def parse_by_gmsh(text: str) -> dict[str, list[Any]]:

@@ -137,8 +137,8 @@ def of_order(body: Body, order: int) -> Body:
         middles = elements.locations_of(shape, 2)[len(corners) :]
         pairs = [tuple(map(int, pair)) for pair in QUADRATIC[name][1].split()]
         of_pairs = [(corners[a] + corners[b]) / 2 for a, b in pairs]
-        places = [int(np.abs(middles - at).sum(axis=1).argmin()) for at in of_pairs]
-        order_of_vtk = [*range(len(corners)), *(len(corners) + k for k in places)]
+        indices = [int(np.abs(middles - at).sum(axis=1).argmin()) for at in of_pairs]
+        order_of_vtk = [*range(len(corners)), *(len(corners) + k for k in indices)]
         cells.append((name, table[:, order_of_vtk]))
     return replace(body, points=space.locations, cells=cells)
 
@@ -185,8 +185,8 @@ def displacement_of_joints(solution: Solution, field: Field, order: int) -> np.n
     lower_bodies = [joint.lower for joint in solution.result.case.of_joints] or ["foundation"]
     for k, lower in enumerate(lower_bodies):
         below, surface = solution.bodies[lower], joint_body(solution.bodies, k)
-        places = elements.Space(below, order).find(elements.Space(surface, order))
-        parts.append(everywhere(field, lower)[places])
+        nodes = elements.Space(below, order).find(elements.Space(surface, order))
+        parts.append(everywhere(field, lower)[nodes])
     return np.concatenate(parts)
 
 
@@ -306,11 +306,11 @@ def write_views(path: Path, points: np.ndarray, cells: Cells, views: list[View])
     gmsh.write(str(path))
     for name, kind, steps in views:
         view = gmsh.view.add(name)
-        places = tags if kind == "NodeData" else np.arange(1, first)
+        numbers = tags if kind == "NodeData" else np.arange(1, first)
         for step, (time, values) in enumerate(steps.items()):
-            values = values.reshape(len(places), -1)
+            values = values.reshape(len(numbers), -1)
             gmsh.view.addHomogeneousModelData(
-                view, step, scratch, kind, places, values.ravel(), time, values.shape[1]
+                view, step, scratch, kind, numbers, values.ravel(), time, values.shape[1]
             )
         gmsh.view.write(view, str(path), append=True)
         gmsh.view.remove(view)

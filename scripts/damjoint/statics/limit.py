@@ -91,9 +91,9 @@ def mechanism_of_joint(case: Case, history: dict[str, np.ndarray]) -> tuple[str,
         ("sliding", np.abs(history["T"]), shear, FORCES, "T = {} exceeds the strength, {}"),
         ("overturning", -history["M"], tension, MOMENTS, "-M = {} exceeds the resistance, {}"),
     ):
-        beyond = np.flatnonzero(demand > bound + MARGIN * np.abs(demand))
-        if len(beyond):
-            first = beyond[0]
+        exceeded = np.flatnonzero(demand > bound + MARGIN * np.abs(demand))
+        if len(exceeded):
+            first = exceeded[0]
             reason = words.format(*(with_unit(v[first], units, 6) for v in (demand, bound)))
             level = history["level"][first]
             return name, f"{name}: no equilibrium at level {level:.6g} m: {reason}"

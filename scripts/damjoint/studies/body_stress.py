@@ -64,8 +64,8 @@ def corners(solution: Solution, time: float) -> list[tuple[Array, float]]:
 def regular(points: Array, ends: list[tuple[Array, float]]) -> BoolArray:
     """Which of some points (n, 3) are not close to the ends of a joint, see `corners`."""
     result = np.ones(len(points), bool)
-    for places, reach in ends:
-        distance, _ = cKDTree(places).query(points)
+    for points_of_end, reach in ends:
+        distance, _ = cKDTree(points_of_end).query(points)
         result &= distance > reach
     return result
 
@@ -88,8 +88,8 @@ def extremes(solution: Solution, time: float) -> Table:
     names, rows = list[str](), list[list[float]]()
     for name, rock in (("dam", False), ("rock", True)):
         middles, stress = stress_of(solution, time, rock)
-        kept = regular(middles, ends)
-        middles, values = middles[kept], principal(stress[kept])
+        away = regular(middles, ends)
+        middles, values = middles[away], principal(stress[away])
         names.append(name)
         row = list[float]()
         for column, best in ((2, values[:, 2].argmax()), (0, values[:, 0].argmin())):

@@ -219,7 +219,7 @@ class Limits:
             f"--quake {text}: must be a slip > 0 m, or limits slip=S,opening=O,standing, some of "
             "these or several of a kind"
         )
-        found: dict[str, tuple[float, ...]] = {"slip": (), "opening": ()}
+        limits: dict[str, tuple[float, ...]] = {"slip": (), "opening": ()}
         for part in text.split(","):
             if part.strip() == STANDING:
                 continue
@@ -229,10 +229,10 @@ class Limits:
                 value = quantity(words)
             except ValueError:
                 raise bad from None
-            if name not in found or not (math.isfinite(value) and value > 0):
+            if name not in limits or not (math.isfinite(value) and value > 0):
                 raise bad
-            found[name] = (*found[name], value)
-        return cls(**found)
+            limits[name] = (*limits[name], value)
+        return cls(**limits)
 
     @property
     def listed(self) -> list[tuple[str, float]]:
@@ -367,8 +367,8 @@ def plan_with(
     sampled = [*sample.distributions] if sample else []
     names = [("--vary", n) for n, _ in axes] + [("--sample", n) for n in sampled]
     names += [("--tie", n) for n, _ in ties]
-    for place, (option, name) in enumerate(names):
-        if name in settings or any(name == other for _, other in names[:place]):
+    for index, (option, name) in enumerate(names):
+        if name in settings or any(name == other for _, other in names[:index]):
             raise InputError(
                 f"{option} {name}: must be given once, and not by --set, --vary, --sample or --tie "
                 "as well"

@@ -285,9 +285,9 @@ class CriticalLevels:
         None if it has none there. Raises InputError.
         """
         chosen = {n: v for n, v in row.items() if self.matters(joint, n)}
-        found = self.known[keys.key_of(self.case_of(joint, chosen), "reliability")]
+        known = self.known[keys.key_of(self.case_of(joint, chosen), "reliability")]
         names = self.differentiated(joint)
-        texts = [found.get(rate_column(name), "") for name in names]
+        texts = [known.get(rate_column(name), "") for name in names]
         if "" in texts:
             return None
         given = dict(zip(names, map(float, texts), strict=True))
@@ -333,8 +333,8 @@ class CriticalLevels:
                 self.on_row(key, joint, values_of[key], result)
                 # as the file has it: a study that continues takes the same points
                 numbers = ["critical_level", *map(rate_column, further)]
-                found = {n: result.get(n, "") for n in numbers}
-                rest = {n: v if v == "" else rounded(float(v)) for n, v in found.items()}
+                given = {n: result.get(n, "") for n in numbers}
+                rest = {n: v if v == "" else rounded(float(v)) for n, v in given.items()}
                 self.known[key] = {**result, **rest}
         results = [self.known[key] for key in names]
         self.used |= dict(zip(names, results, strict=True))
@@ -442,7 +442,7 @@ class Reliability:
     point: tuple[float, ...]
     design: Mapping[str, float]
     importance: Mapping[str, float]
-    found: bool
+    converged: bool
     #: probabilities of failure; None without a design point, or where a curvature does not allow
     #: them
     form: float | None
@@ -523,7 +523,7 @@ def design_point(limit: LimitState, normal: Any, start: Sequence[float]) -> Reli
         point=point,
         design=variables.values(point),
         importance={n: float(s) for n, s in zip(variables.names, shares, strict=True)},
-        found=status == ot.OptimizationResult.SUCCESS,
+        converged=status == ot.OptimizationResult.SUCCESS,
         form=float(result.getEventProbability()),
         breitung=probability_of(second.getEventProbabilityBreitung),
         tvedt=probability_of(second.getEventProbabilityTvedt),

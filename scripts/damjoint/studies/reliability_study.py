@@ -118,7 +118,7 @@ def as_json(levels: CriticalLevels, results: Sequence[Reliability]) -> dict[str,
             "joint": one.joint,
             **numbers,
             "samples": one.samples,
-            "converged": one.found,
+            "converged": one.converged,
             "design_point": dict(one.design),
             "importance": dict(one.importance),
             "agreement": one.words(),
@@ -172,7 +172,7 @@ def printed_lines(levels: CriticalLevels, results: Sequence[Reliability], out: P
     lines += [tabulate(methods(whole), heads, disable_numparse=True), ""]
     verdicts = [(f"{one.joint}: " if one.joint else "", one.words()) for one in results]
     lines += [joint + words for joint, words in verdicts if words]
-    if whole.form and not whole.found:
+    if whole.form and not whole.converged:
         lines.append("the search for the design point has not converged: FORM is doubtful")
     count = len(levels.used)
     if levels.undecided:

@@ -351,18 +351,18 @@ def run_section(folder: Path, number: int, solution: Solution) -> RunSection:
 
 def further_pictures(folder: Path, result: Results) -> dict[str, Picture]:
     """The pictures of flow in time, with its balance, and of a calibration, by their headings."""
-    found, last = dict[str, Picture](), result.last
+    pictures, last = dict[str, Picture](), result.last
     water, fit = (folder / f"{result.case.name}_{n}.png" for n in ("water", "calibration"))
     if water.is_file() and "water_in" in last:
         caption = (
             f"Water in the joint at the end: {1e3 * last['water']:.4g} l/m, of which "
             f"{1e3 * last['water_in']:.4g} l/m have come in; void {1e3 * last['void']:.3g} l/m."
         )
-        found["Flow in time"] = Picture("bands", caption, bands(water))
+        pictures["Flow in time"] = Picture("bands", caption, bands(water))
     calibration = result.info.get("calibration")
     if fit.is_file() and calibration:
-        found["Calibration"] = Picture("bands", calibration["verdict"], bands(fit))
-    return found
+        pictures["Calibration"] = Picture("bands", calibration["verdict"], bands(fit))
+    return pictures
 
 
 def state_of_last(last: Mapping[str, float], quake: Mapping[str, Any] | None) -> str:
@@ -579,8 +579,8 @@ def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str,
     size = (WIDE[0], 1 + PER_JOINT * len(result.joints)) if rows else HALF if has_fields else SOLID
     joint = figure_of(*size)
     run_picture.draw_all_joints(joint, solution, time)
-    place = "half" if size is HALF else "full"
-    yield place, f"Joint{'s' if several else ''} {at_level}.{colors}", joint
+    layout = "half" if size is HALF else "full"
+    yield layout, f"Joint{'s' if several else ''} {at_level}.{colors}", joint
     if changes and not (rows and has_fields):
         yield "full", "", history_of(result, WIDE)
     if result.case["dim"] == 3 and has_fields and not run_picture.is_user_solid(result.case):
@@ -616,12 +616,12 @@ def critical_value(info: dict[str, Any] | None) -> str:
 
 def earthquake(info: dict[str, Any]) -> str:
     """Statement of `damjoint quake`, if run.json has it."""
-    found = info.get("quake")
-    if not found or "at_rest" not in found:
+    summary = info.get("quake")
+    if not summary or "at_rest" not in summary:
         return ""
-    ground = abs(found["peaks"]["ground_ax"]["value"])
+    ground = abs(summary["peaks"]["ground_ax"]["value"])
     return (
-        f"earthquake {Path(found['record']).name}, {ground / STANDARD_GRAVITY:.3g} g: "
+        f"earthquake {Path(summary['record']).name}, {ground / STANDARD_GRAVITY:.3g} g: "
         f"{info['statement']}; N', T and the last row of the levels are those of the static state "
         "after it"
     )

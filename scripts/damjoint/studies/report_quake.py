@@ -49,35 +49,35 @@ def read(folder: Path, case: Case, info: dict[str, Any]) -> Earthquake | None:
 
     Raises OSError, ValueError if its table is damaged.
     """
-    found = info.get("quake")
-    if not found or "at_rest" not in found:
+    summary = info.get("quake")
+    if not summary or "at_rest" not in summary:
         return None
     rows = stored.read_csv(folder / "quake.csv")
     # from rest at t = 0, where the table has no row
     rows = {name: np.append(0.0, rows[name]) for name in ("time", "ground_ax", "ground_ay")}
-    path, first = folder / f"{info['case']}_quake.png", 1 / found["frequencies"][0]
+    path, first = folder / f"{info['case']}_quake.png", 1 / summary["frequencies"][0]
     pictures = list[Picture]()
     if path.is_file():
         caption = "Earthquake: relative to the ground, since the static state before it."
         pictures.append(Picture("bands", caption, bands(path)))
     halved = "none of them halved"
-    if found["halvings"]:
-        halved = f"halved up to {found['halvings']} times where they did not converge"
+    if summary["halvings"]:
+        halved = f"halved up to {summary['halvings']} times where they did not converge"
     notes = [
-        *(f"{note}." for note in found["notes"]),
-        *beside_rigid_block(case, found),
-        f"{quake_result.modes(found)}.",
+        *(f"{note}." for note in summary["notes"]),
+        *beside_rigid_block(case, summary),
+        f"{quake_result.modes(summary)}.",
         f"Water pressure in the joint: {report_input.uplift_in_earthquake(case)}.",
-        f"{found['steps']} steps of {found['dt']:g} s over {found['time']:g} s, {halved}.",
+        f"{summary['steps']} steps of {summary['dt']:g} s over {summary['time']:g} s, {halved}.",
     ]
     tables = {
         "ground motion": record_table(rows, first),
-        "peaks": quake_result.peaks_table(found, case, of_joints=not case.of_joints),
+        "peaks": quake_result.peaks_table(summary, case, of_joints=not case.of_joints),
     }
     if case.of_joints:
-        tables["all joints"] = quake_result.joints_table(found, case)
+        tables["all joints"] = quake_result.joints_table(summary, case)
     else:
-        tables["end"] = quake_result.residual_table(found, case)
+        tables["end"] = quake_result.residual_table(summary, case)
     spectra = Picture("full", "", embedded(draw_spectra(rows, first)))
     return Earthquake(spectra, pictures, tables, [note[0].upper() + note[1:] for note in notes])
 
@@ -143,9 +143,9 @@ def draw_spectra(rows: Columns, period: float) -> Figure:
     return figure
 
 
-def beside_rigid_block(case: Case, found: dict[str, Any]) -> list[str]:
+def beside_rigid_block(case: Case, summary: dict[str, Any]) -> list[str]:
     """Why slip and rigid block differ, in words; empty without a block that stands at rest."""
-    residual, peaks = found["residual"], found["peaks"]
+    residual, peaks = summary["residual"], summary["peaks"]
     blocks = [k for k in range(len(case.joints)) if column_of("rigid_block", k) in residual]
     if not blocks or column_of("slip", 0) not in residual:
         return []

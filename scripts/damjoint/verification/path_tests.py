@@ -36,15 +36,15 @@ def follow(test: PathTest) -> dict[str, Array]:
 
 def read(test: PathTest, history: dict[str, Array]) -> Array:
     """The displacement of the point [m] at the factors of a test."""
-    factor, moved, start, found = history["load_factor"], history["point_u"], 0, list[float]()
+    factor, moved, start, moves = history["load_factor"], history["point_u"], 0, list[float]()
     for value, rising in test.read_at:
         sign = 1 if rising else -1
         ends = np.diff(np.sign(sign * (factor - value))) > 0
         step = start + int(np.argmax(ends[start:]))
         share = (value - factor[step]) / (factor[step + 1] - factor[step])
-        found.append(float(moved[step] + share * (moved[step + 1] - moved[step])))
+        moves.append(float(moved[step] + share * (moved[step + 1] - moved[step])))
         start = step + 1
-    return np.array(found)
+    return np.array(moves)
 
 
 def ssnp133() -> dict[str, PathTest]:

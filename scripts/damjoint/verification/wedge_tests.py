@@ -77,11 +77,11 @@ class WedgeTest:
         """Its law: the published ones in pure opening."""
         length = self.G / self.f_t
         if self.softening == "linear":
-            begin, left, end = ADHERENCE * 2 * length, 1 - ADHERENCE, 2 * length
+            begin, remaining, end = ADHERENCE * 2 * length, 1 - ADHERENCE, 2 * length
         else:
             begin = ADHERENCE * length
-            left, end = np.exp(-ADHERENCE), begin + 2 * length
-        strength = self.f_t * left
+            remaining, end = np.exp(-ADHERENCE), begin + 2 * length
+        strength = self.f_t * remaining
         settings: dict[str, Value] = {"sigma_max": strength, "K_N": strength / begin}
         settings |= {"pena_rupture": end / begin - 1, "pena_contact": 1.0}
         settings |= {"law": "rupture", "softening": self.softening}
