@@ -118,7 +118,7 @@ def test_a_report_on_modes_is_refused(command, tmp_path):
     few = "--set", "n_joint=4", "--set", "order=1", "--no-picture", "--out", "found"
     assert command("modes", "dam", *few)[0] == 0
     code, _, err = command("report", "found")
-    assert code == 2 and "must be a run with results" in err
+    assert code == 2 and "must be of run, check, critical or quake" in err
     with pytest.raises(dj.InputError):
         stored.read(tmp_path / "found")
 

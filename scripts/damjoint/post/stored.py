@@ -47,8 +47,10 @@ def read(folder: Path) -> Solution:
     Raises InputError if the run has no results or its files are damaged.
     """
     info = read_info(folder) or {}
+    state = info.get("state", "unknown")
+    if state == "complete" and "levels" not in info:
+        raise InputError(f"out = {folder}: must be of run, check, critical or quake")
     if "parameters" not in info:
-        state = info.get("state", "unknown")
         raise InputError(f"out = {folder}: must be a run with results; its state is {state}")
     try:
         result = read_results(info, folder)
