@@ -16,6 +16,8 @@ WATER, DENSITY, VISC = 9810.0, 1000.0, 1e-3
 #: Dam of 28 m on a joint without tension, with a film of water in time.
 FILM = {"law": "friction", "adhesion": 0.0, "mu": 1.5, "uplift": "flow", "n_joint": 24.0}
 FILM |= {"turbulent": 1.0, "storage": 1e-12, "aperture_min": 1e-4}
+COARSE = {"n_joint": 8.0, "order": 1.0}
+SOLID = {"dim": 3.0, "thickness": 12.0, "n_layers": 3.0, "mesh_pattern": "split"}
 
 
 @pytest.fixture(scope="module")
@@ -93,9 +95,74 @@ def test_it_resists_more():
     assert said == [True, False]
 
 
+@pytest.fixture(scope="module")
+def solid():
+    return Model(load("dam", FILM | COARSE | SOLID, (30.0,)))
+
+
+@pytest.mark.parametrize("width", [3e-3, 1e-4])
+def test_uniform_flow_in_three_dimensions(solid, width):
+    """Between two heads along a joint of constant aperture: the flux is that of the friction
+    factor, at Re = 1.2e4 and, laminar, at 1.7.
+    """
+    (system,), variables = solid.equilibrium.flowing, solid.start().variables
+    (water,) = system.members
+    loading = Loading(30.0, 0.0)
+    opened = np.full(len(system.flow.points.weights), width - 1e-4)
+    jump = np.linalg.lstsq(system.flow.opening.toarray(), opened, rcond=None)[0]
+    pressure = water.pressure(jump, variables, loading)
+    along = 30 * WATER / 34
+    flux = brentq(lambda q: gradient(q, width) - along, 1e-12, 1e3, xtol=1e-18, rtol=1e-14)
+    assert pressure.flux == pytest.approx(np.full(len(pressure.flux), DENSITY * flux), rel=1e-8)
+    assert pressure.leakage == pytest.approx(DENSITY * flux, rel=1e-8)
+    assert (1e4 < 2 * DENSITY * flux / VISC < 1.5e4) == (width == 3e-3)
+
+
+@pytest.mark.parametrize("seconds", [0.1, None])
+def test_the_tangent_in_three_dimensions(solid, seconds):
+    """Flow across the joint, too: a change across the flow has another conductivity than along."""
+    (system,), variables = solid.equilibrium.flowing, solid.start().variables
+    flow, loading, step = system.flow, Loading(30.0, 0.0), None
+    x, _, z = flow.points.positions.T
+    size = 8e-3 * (1.3 + np.sin(0.2 * x) * np.cos(z))
+    jump = np.linalg.lstsq(flow.opening.toarray(), size, rcond=None)[0]
+    if seconds:
+        begin = system.stored_at(jump, variables, loading, 0.0)
+        step = TimeStep(seconds=seconds, begin=begin)
+    solve = lambda at: system.solve(at, variables, loading, None, step)
+    solution = solve(0.999 * jump)
+    derivative = system.derivative(0.999 * jump, variables, solution, None, step)
+    (of_flow,) = solution.systems
+    assert of_flow.slowed.max() < 0.57
+    way = np.random.default_rng(1).normal(size=len(jump)) * 1e-7
+    above, below = (solve(0.999 * jump + s * way).pressure for s in (1, -1))
+    expected = derivative.pressure @ way[derivative.columns]
+    assert (above - below) / 2 == pytest.approx(expected, abs=1e-5 * np.abs(expected).max())
+    if step:
+        stored = solution.stored(1.0, step.begin)
+        kept = stored.volume.sum() - stored.inflow.sum()
+        assert kept == pytest.approx(step.begin.volume.sum(), rel=1e-11)
+
+
+def test_a_slice_has_the_flow_of_the_section(solid):
+    """Of a wedge, turbulent and laminar: to what the quadratures of triangles and lines differ."""
+    flat, loading = Model(load("dam", FILM | COARSE, (30.0,))), Loading(30.0, 0.0)
+    for size in 1e-2, 1e-4:
+        found = []
+        for of in flat, solid:
+            (system,), variables = of.equilibrium.flowing, of.start().variables
+            jump = wedge(of, size)
+            beyond = system.expand_to_nodes(system.solve(jump, variables, loading))
+            leakage = system.members[0].pressure(jump, variables, loading).leakage
+            found.append((system.fields.joint.surface.points[:, 0], beyond, leakage))
+        (x, of_section, out), (at, of_slice, out_of_slice) = found
+        order = np.argsort(x)
+        expected = np.interp(at, x[order], of_section[order])
+        assert of_slice == pytest.approx(expected, abs=1e-2 * np.abs(expected).max())
+        assert out_of_slice == pytest.approx(out, rel=1e-2)
+
+
 def test_refused(command):
-    with pytest.raises(InputError, match="turbulent = 1: must be 0 in 3D"):
-        load("dam", FILM | {"dim": 3.0})
     words = "run", "dam", "--engine", "getdp", "--set", "uplift=flow", "--set", "turbulent=1"
     code, out, error = command(*words)
     assert (code, out) == (2, "") and "turbulent = 1: must be 0 with engine = getdp" in error

@@ -390,9 +390,7 @@ def check_drains(case: ParameterValues) -> None:
 
 
 def check_time(case: ParameterValues) -> None:
-    """Flow in time: of uplift = flow, without a pseudo-static earthquake. Turbulent flow: in 2D."""
-    if case["turbulent"] and case["uplift"] == "flow" and case["dim"] == 3:
-        raise InputError("turbulent = 1: must be 0 in 3D (cubic law)")
+    """Flow in time: of uplift = flow, without a pseudo-static earthquake."""
     if case["quake_uplift"] == "transient":
         if case["k_h"] or case["k_v"]:
             raise InputError(

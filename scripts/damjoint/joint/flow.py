@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -120,8 +121,8 @@ class FlowSystem:
     gradients: list[Array]
     #: product of the inverse flow matrix with a matrix (inner nodes, m)
     inverse: Callable[[Array], Array]
-    #: the same for other conductivities (q,)
-    inverse_of: Callable[[Array], Callable[[Array], Array]] | None = None
+    #: the same for other conductivities (q,): of a change across the flow, and along it
+    inverse_of: Callable[[Array, Array], Callable[[Array], Array]] | None = None
     share: float = 1.0
     #: derivative of the flux with the gradient, and with the aperture, over those of the cubic law
     #: (q,); None: it is that law
@@ -421,8 +422,8 @@ class Flow:
             drops[cells] = difference * resistance[cells] / whole
         steepness = (drops / self.lengths)[self.points.elements]
 
-        def inverse_of(conductivity: Array) -> Callable[[Array], Array]:
-            other, _ = self._in_lines(conductivity, imposed, heads, known)
+        def inverse_of(_: Array, along: Array) -> Callable[[Array], Array]:
+            other, _ = self._in_lines(along, imposed, heads, known)
             return other.systems[0].inverse
 
         def inverse(coupling: Array) -> Array:
@@ -478,13 +479,22 @@ class Flow:
         matrix = np.bincount(self.entries, values, number**2)
         return np.asarray(matrix.reshape(number, number), float)
 
+    def tangent_matrix(self, across: Array, along: Array, gradients: list[Array]) -> Array:
+        """3D: the same for conductivities times weights of a change across the flow, and along it;
+        gradients: of the flow, as in `FlowSystem`.
+        """
+        size = np.maximum(np.sqrt(sum(g**2 for g in gradients)), 1e-300)
+        slopes = zip(self.fields.slopes, gradients, strict=True)
+        in_flow = added([slope.scaled(g / size) for slope, g in slopes])
+        less = in_flow.T @ in_flow.scaled(across - along)
+        return np.asarray(self.matrix(across) - less.toarray())
+
     def _on_surface(
         self, conductivity: Array, imposed: Array, heads: Array, known: BoolArray
     ) -> tuple[FlowSolution, Array]:
         """3D: one symmetric positive definite system; nan if the ratio of the conductivities is too
         large for it. The solution, and what enters at the nodes.
         """
-        number = self.fields.nodes
         matrix = self.matrix(conductivity)
         free = np.flatnonzero(~known[self.inside])
         nodes = self.inside[free]
@@ -495,17 +505,26 @@ class Flow:
             total[nodes] -= linalg.cho_solve(factor, matrix[nodes] @ total)
         except (np.linalg.LinAlgError, ValueError):
             nothing = np.full(len(self.inside), np.nan)
-            return FlowSolution(pressure=nothing, systems=[]), np.zeros(number)
+            return FlowSolution(pressure=nothing, systems=[]), np.zeros(len(total))
 
-        def inverse(coupling: Array) -> Array:
-            solution = np.zeros_like(coupling)
-            solution[free] = linalg.cho_solve(factor, coupling[free])
-            return solution
+        def inverse_by(factor: Any) -> Callable[[Array], Array]:
+            def inverse(coupling: Array) -> Array:
+                solution = np.zeros_like(coupling)
+                solution[free] = linalg.cho_solve(factor, coupling[free])
+                return solution
+
+            return inverse
+
+        def inverse_of(across: Array, along: Array) -> Callable[[Array], Array]:
+            matrix = self.tangent_matrix(across, along, gradients)
+            return inverse_by(linalg.cho_factor(matrix[np.ix_(nodes, nodes)]))
 
         gradients = [g @ total for g in self.fields.slopes]
         solution = FlowSolution(
             pressure=(total - imposed)[self.inside],
-            systems=[FlowSystem(gradients=gradients, inverse=inverse)],
+            systems=[
+                FlowSystem(gradients=gradients, inverse=inverse_by(factor), inverse_of=inverse_of)
+            ],
         )
         return solution, np.asarray(matrix @ total, float)
 

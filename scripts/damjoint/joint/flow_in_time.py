@@ -154,7 +154,7 @@ class WaterBalance:
                         FlowSystem(
                             gradients=system.gradients,
                             inverse=system.inverse,
-                            inverse_of=partial(self.inverse_of, ground, fixed),
+                            inverse_of=partial(self.inverse_of, ground, fixed, system.gradients),
                         )
                     ],
                     at_ends=(total - imposed)[self.flow.fields.ends],
@@ -179,10 +179,18 @@ class WaterBalance:
         return form(self.flow, conductivity, ground, known)
 
     def inverse_of(
-        self, ground: Array, known: BoolArray, conductivity: Array
+        self,
+        ground: Array,
+        known: BoolArray,
+        gradients: list[Array],
+        across: Array,
+        along: Array,
     ) -> Callable[[Array], Array]:
         """See `FlowSystem`."""
-        return self.matrix(ground, known, conductivity).inverse
+        if self.flow.dim == 2:
+            return OnLines(self.flow, along, ground, known).inverse
+        flux = self.flow.tangent_matrix(across, along, gradients)
+        return OnSurface(self.flow, across, ground, known, flux).inverse
 
 
 class BalanceMatrix(Protocol):
@@ -377,9 +385,17 @@ class OnLines:
 class OnSurface:
     """3D: one symmetric positive definite matrix. Raises LinAlgError or ValueError if it is not."""
 
-    def __init__(self, flow: Flow, conductivity: Array, ground: Array, known: BoolArray) -> None:
+    def __init__(
+        self,
+        flow: Flow,
+        conductivity: Array,
+        ground: Array,
+        known: BoolArray,
+        flux: Array | None = None,
+    ) -> None:
+        """flux: matrix of the flow, where it is not that of the conductivities."""
         self.flow, self.free = flow, np.flatnonzero(~known)
-        self.flux = flow.matrix(conductivity)
+        self.flux = flow.matrix(conductivity) if flux is None else flux
         self.diagonal = np.diag(self.flux)
         matrix = self.flux[np.ix_(self.free, self.free)]
         matrix[np.diag_indices_from(matrix)] += ground[self.free]

@@ -66,7 +66,7 @@ def turbulent_flow(
         if np.abs(change).max() < TOLERANCE:
             tangent = np.where(new < 1, EXPONENT * share, 1)
             assert system.inverse_of
-            inverse = system.inverse_of(conductivity * tangent)
+            inverse = system.inverse_of(conductivity * share, conductivity * tangent)
             system = replace(system, inverse=inverse, slowed=tangent)
             return replace(solution, systems=[system]), share
         before = [*before[-DEPTH:], (log, change)]

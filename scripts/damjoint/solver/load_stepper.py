@@ -71,6 +71,9 @@ class LoadStepper:
         self.limit_points: tuple[tuple[float, float], ...] = ()
         #: the levels at which a crack grew unstably, to a state that depends on the steps
         self.relaxed_at: tuple[float, ...] = ()
+        #: time of the step in which the pressure of water in time has changed most beyond the
+        #: change of the levels, and by how much [Pa]
+        self.largest_move = (0.0, 0.0)
         #: the prescribed displacement at drive_begin, and the level at drive_end
         self.displacement_at_begin = self.level_at_drive_end = 0.0
 
@@ -171,6 +174,11 @@ class LoadStepper:
 
     def accept(self, step: StepResult, cuts: int) -> None:
         """Commit a converged step; cuts: how often it was shortened."""
+        weight, new, old = self.case["rho_water"] * self.case["g"], step.state, self.state
+        rise = np.abs([new.loading.level - old.loading.level, new.loading.tail - old.loading.tail])
+        move = self.move_of_pressure(step) - weight * float(rise.max())
+        if move > self.largest_move[1]:
+            self.largest_move = (new.time, move)
         self.state = step.state.after(self.state)
         self.history.add(step, cuts)
         if self.drives:
@@ -261,11 +269,18 @@ class LoadStepper:
 
     def moves_pressure(self, step: StepResult) -> bool:
         """Whether the pressure of water that flows in time changes by more than `pressure_step`."""
-        most, before = self.case["pressure_step"], self.state.pressures
-        if not (most and step.state.stored and before):
-            return False
-        pairs = zip(step.state.pressures, before, strict=True)
-        return any(np.abs(new.nodes - old.nodes).max() > most for new, old in pairs)
+        most = self.case["pressure_step"]
+        return bool(most) and self.move_of_pressure(step) > most
+
+    def move_of_pressure(self, step: StepResult) -> float:
+        """Largest change of the pressure of water that flows in time, at the nodes, from the last
+        state to a step [Pa].
+        """
+        new, old = step.state, self.state
+        if not (new.stored and old.pressures):
+            return 0.0
+        pairs = zip(new.pressures, old.pressures, strict=True)
+        return max(float(np.abs(end.nodes - begin.nodes).max()) for end, begin in pairs)
 
     def beyond_path(self, smallest: bool) -> bool:
         """Whether an equilibrium path has ended and is not followed again: the dam has failed, or
@@ -426,6 +441,7 @@ class LoadStepper:
             "weight_with_water": self.weight_with_water,
             "limit_points": self.limit_points,
             "unstable_growth": self.relaxed_at,
+            "pressure_moves": self.largest_move if self.largest_move[1] > 0 else (),
             "end_of_solution": self.end_of_solution,
             "converged_by_round_off": self.history.by_round_off,
         }

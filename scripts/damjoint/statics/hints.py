@@ -20,6 +20,9 @@ LEAST_FOUNDATION = 1.5
 SOFT_JOINT = 1
 #: Bulk modulus of water [Pa].
 WATER_MODULUS = 2.2e9
+#: Change of the pressure of water in time in a step, over that of the highest water, beyond which
+#: it is noted [-].
+LARGE_MOVE = 0.5
 
 
 def hints(results: Results) -> list[str]:
@@ -69,7 +72,7 @@ def turbulence(case: Case, rows: Table) -> str:
         return ""
     return (
         f"the Reynolds number of the flow reaches {number:.3g}: beyond {TURBULENT} it is "
-        "turbulent, and resists more than the laminar film of the model; turbulent = 1 (2D)"
+        "turbulent, and resists more than the laminar film of the model; turbulent = 1"
     )
 
 
@@ -113,6 +116,14 @@ def hints_on_run(results: Results) -> list[str]:
         messages.append(
             "storage = 0: a film without compressibility is much stiffer in a short step than the "
             f"joint; water in aperture_min has storage = {width / WATER_MODULUS:.2g}"
+        )
+    time, move = results.info.get("pressure_moves") or (0.0, 0.0)
+    highest = case["rho_water"] * case["g"] * max(case.levels)
+    if move > LARGE_MOVE * highest:
+        messages.append(
+            f"in the step to t = {time:.4g} the pressure in the joint changes by {move:.3g} Pa "
+            "more than the levels: a step of this length may have several equilibria, and the "
+            f"state then depends on the steps; pressure_step = {LARGE_MOVE * highest:.2g} halves it"
         )
     unstable = bool(levels) or verdict(results) == "not converged"
     for k, joint_result in enumerate(results.joints if last else []):
