@@ -621,7 +621,7 @@ class Network:
             middles = state.distance(sides.corners.mean(axis=1))
             sizes = np.outer(sides.measures, w)
             for side, part in parts.items():
-                beside = touching & (side * (middles - place) > 0)
+                beside = touching & (side * (middles - place) > SAME_PLACE)
                 part[0] += float((sizes * (factor - 1) / CRACK_MOST)[beside].sum())
                 part[1] += float(sizes[beside].sum())
         return sum(cracked / whole for cracked, whole in parts.values() if whole)

@@ -205,7 +205,7 @@ class JointInterface:
         middles = np.concatenate([xi[table].mean(axis=1) for table in tables])
         weights = np.zeros(len(self.points.weights))
         for side in (-1, 1):
-            beside = touching & (side * (middles - xi[nodes].mean()) > 0)
+            beside = touching & (side * (middles - xi[nodes].mean()) > same)
             of_side = np.where(beside[self.points.elements], self.points.weights, 0)
             weights += of_side / (of_side.sum() or 1)
         return nodes, weights
