@@ -143,15 +143,13 @@ def relative_errors(values: np.ndarray, exact: np.ndarray) -> np.ndarray:
         return np.where(exact == 0, 0, np.abs(values / exact - 1))
 
 
-def mesh_settings(
-    order: int, n: int, grading: float, pattern: str, dim: int, height: float = 10.0
-) -> dict[str, Any]:
-    """Return the parameters of a mesh with n elements along the joint.
+def mesh_settings(order: int, n: int, grading: float, pattern: str, dim: int) -> dict[str, Any]:
+    """Return the parameters of a mesh with n elements along the joint of a dam of 10 m.
 
     grading: element sizes far from the joint, relative to those of --accuracy.
     """
     # the automatic sizes of pro/parameters.pro
-    sizes = {"h_dam": 1.25 * grading * height / n**0.5, "h_found": 2.5 * grading * height / n**0.5}
+    sizes = {"h_dam": 12.5 * grading / n**0.5, "h_found": 25 * grading / n**0.5}
     if dim == 3:
         thickness = 0.2 if pattern == "free" else 1.0
         sizes |= {"dim": 3.0, "thickness": thickness, "n_layers": 1.0, "hold_z": 1.0}

@@ -32,10 +32,10 @@ def test_two_intensities_have_the_curve_through_their_shares():
     assert (high[0], low[1]) == pytest.approx((0.5, 0.5), abs=1e-9)
 
 
-@pytest.mark.parametrize("scatter, least", [(0.0, 87), (0.35, 87)])
-def test_the_interval_covers_the_median_of_rows_that_depend_on_their_record(scatter, least):
+@pytest.mark.parametrize("scatter, most", [(0.0, 100), (0.35, 79)])
+def test_the_interval_covers_the_median_of_rows_that_depend_on_their_record(scatter, most):
     """100 studies of 12 records at 8 scales; scatter: part of the dispersion 0.4 between records.
-    Of 95 %, 87 to 100 of 100 in 99.9 % of such tests.
+    Of 95 %, 87 to 100 of 100 in 99.9 % of such tests; most: as if rows were independent.
     """
     generator, covered, naive = np.random.default_rng(3), 0, 0
     for _ in range(100):
@@ -49,8 +49,7 @@ def test_the_interval_covers_the_median_of_rows_that_depend_on_their_record(scat
         covered += low < 1.0 < high
         low, high = fit(scale, scale > capacity).median_interval()
         naive += low < 1.0 < high
-    assert covered >= least
-    assert scatter == 0 or naive < 80  # as if they were independent
+    assert covered >= 87 and naive <= most
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from .cases import load_cases
-from .options import Checked, Parser, path, say, table_width, time_span
+from .options import Checked, Parser, say, table_width, time_span
 
 SUMMARY = (
     "the dam through recorded earthquakes, after its static loads; continues if it was "
@@ -22,11 +22,9 @@ def add(command: Parser) -> None:
     command.add_all_steps()
     command.add_wide()
     command.add_case()
-    command.add_argument(
+    command.add_path(
         "--record",
-        metavar="FILE",
-        action=Checked,
-        convert=path,
+        "FILE",
         repeats=True,
         help="CSV of the ground's acceleration: time [s], horizontal and, if any, vertical, in "
         "record_unit; repeatable: each earthquake has a folder with the name of its record "

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from .. import InputError
 from .cases import load_case, print_note
-from .options import RESUMED, Checked, Parser, path, say, table_width
+from .options import RESUMED, Parser, say, table_width
 
 if TYPE_CHECKING:
     from ..arrays import Value
@@ -78,11 +78,9 @@ def add(command: Parser) -> None:
         "or another one, slip=0.05,slip=0.2,opening=0.01, or if the dam does not stand: a "
         "fragility curve for each (default: none)",
     )
-    command.add_argument(
+    command.add_path(
         "--record",
-        metavar="FILE",
-        action=Checked,
-        convert=path,
+        "FILE",
         repeats=True,
         help="record of the rows of --quake, as in damjoint quake; repeatable: each row with each "
         "record (default: that of the case)",

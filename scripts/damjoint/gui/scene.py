@@ -9,6 +9,7 @@ import numpy as np
 from .. import InputError, RunError, accuracy
 from ..arrays import Table as Columns
 from ..engines import Outcome
+from ..input.case import Case
 from ..mesh.body import Body
 from ..model.fields import Field
 from ..model.loads import Loading
@@ -143,13 +144,18 @@ def times_of(result: Results) -> np.ndarray:
     return np.unique(result.joint["time"])
 
 
+def level_reached(case: Case, level: float, time: float) -> str:
+    """The level of a step and its time."""
+    return f"level {level:.4g} m, t = {time:.4g} of {case.times[-1]:g}"
+
+
 def reached(state: str, result: Results) -> str:
     """What a run has reached before it was interrupted, or failed: level, mesh, estimated error."""
     case, estimate = result.case, result.info.get("error_estimate")
     if not result.last:
         return state
     last = result.last
-    words = f"{state} at level {last['level']:.4g} m, t = {last['time']:.4g} of {case.times[-1]:g}"
+    words = f"{state} at {level_reached(case, last['level'], last['time'])}"
     if estimate:
         meshes = estimate["n_joint"]
         errors = [q["relative"] for q in estimate["quantities"].values() if q["used"]]

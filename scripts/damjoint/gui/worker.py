@@ -28,7 +28,7 @@ from ..runner import write_outcomes
 from ..session import session
 from ..storage import atomic_write
 from ..studies import quake, quake_study
-from .scene import SolvedScene
+from .scene import SolvedScene, level_reached
 from .sheet import Request, Sheet, case_text, check_request, titles
 
 #: Least time between two pictures of an earthquake while it is computed [s].
@@ -123,7 +123,7 @@ def run_case(sheet: Sheet, pipe: Connection, stop: Stop) -> tuple[list[SolvedSce
         last[:] = scene, number, time
         several = f"uplift {case.scenes()[scene]['uplift']}, " if case.also_uplift else ""
         several += f"pass {number}, " if case.accuracy else ""
-        pipe.send(("step", several + level_reached(case, time)))
+        pipe.send(("step", several + level_reached(case, case.level_at(time), time)))
         stop.after_step()
 
     with stop:
@@ -144,7 +144,7 @@ def run_quake(sheet: Sheet, pipe: Connection, stop: Stop) -> tuple[list[SolvedSc
     case, error = sheet.case, None
 
     def on_step(time: float) -> None:
-        pipe.send(("step", level_reached(case, time)))
+        pipe.send(("step", level_reached(case, case.level_at(time), time)))
         stop.after_step()
 
     with single_thread():
@@ -186,11 +186,6 @@ class Live:
         self.frames = frames
         self.pipe.send(("live", SolvedScene.of_earthquake(under_way.result_so_far())))
         self.next = time.perf_counter() + max(LIVE, 4 * (time.perf_counter() - start))
-
-
-def level_reached(case: Case, time: float) -> str:
-    """What a static step has reached."""
-    return f"level {case.level_at(time):.4g} m, t = {time:.4g} of {case.times[-1]:g}"
 
 
 def save(folder: str, last: tuple[Case, str, Write] | None) -> None:

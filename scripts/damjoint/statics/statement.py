@@ -12,7 +12,6 @@ from ..model.results import Results
 from ..units import FORCES, STRESSES, with_unit
 from . import gravity
 from .verdict import (
-    REASONS,
     STIFF_JOINT,
     Bound,
     bound,
@@ -21,6 +20,12 @@ from .verdict import (
     stiffness_ratio,
     verdict,
 )
+
+#: Why there is no equilibrium above a bound of statics, by how the dam fails there.
+REASONS = {
+    "overturning": "the resultant leaves the joint",
+    "sliding": "the shear exceeds the strength of the joint",
+}
 
 
 def statement(results: Results) -> str:

@@ -239,9 +239,9 @@ def bound_on_joint(results: Results) -> Bound:
 SAME_CRACK = 0.01
 
 
-def highest_by_statics(case: Case, last: dict[str, float]) -> tuple[float, str, str, str]:
-    """The level [m] above which no equilibrium exists, how the dam fails, why, and at which joint,
-    if there are several; infinite and empty where statics gives no bound.
+def highest_by_statics(case: Case, last: dict[str, float]) -> tuple[float, str, str]:
+    """The level [m] above which no equilibrium exists, how the dam fails, and at which joint, if
+    there are several; infinite and empty where statics gives no bound.
 
     last: the last row of the history.
     """
@@ -250,16 +250,7 @@ def highest_by_statics(case: Case, last: dict[str, float]) -> tuple[float, str, 
         for k, joint in enumerate(case.joints)
         if case.separates((k,))
     )
-    level, mode, joint = min(bounds, default=(np.inf, "", ""))
-    return level, mode, REASONS[mode], joint
-
-
-#: Why there is no equilibrium above the highest level, by how the dam fails there.
-REASONS = {
-    "": "",
-    "overturning": "the resultant leaves the joint",
-    "sliding": "the shear exceeds the strength of the joint",
-}
+    return min(bounds, default=(np.inf, "", ""))
 
 
 def has_bounds(case: Case) -> bool:

@@ -26,7 +26,7 @@ from ..joint.interface import interface_of
 from ..model.results import Results, row_of_joint
 from ..session import end_of
 from ..solver.path import FALL, PRECISION, RISE, ROUGH, SURE, Point
-from ..statics.statement import words_of_bound
+from ..statics.statement import REASONS, words_of_bound
 from ..statics.verdict import bound, highest_by_statics
 from ..threads import limited_threads
 from ..units import FORCES, STRESSES, with_unit
@@ -597,12 +597,12 @@ class Search:
         quantity than the level). Why is empty if they have.
         """
         top = failing.points[failing.top]
-        level, mode, words, joint = highest_by_statics(top.model.case, top.last)
+        level, mode, joint = highest_by_statics(top.model.case, top.last)
         if not level < (top.level * (1 + NEAR_BOUND) if self.of == "level" else failing.target):
             return failing.mode, "", failing.joint
         why = (
-            f"by statics there is no equilibrium above {level:.6g} m, where {words}; the highest "
-            f"computed level is {top.level:.6g} m"
+            f"by statics there is no equilibrium above {level:.6g} m, where {REASONS[mode]}; the "
+            f"highest computed level is {top.level:.6g} m"
         )
         return mode, why, joint
 
