@@ -356,12 +356,12 @@ class Surface:
 @dataclass(frozen=True)
 class DrainLine:
     """Drains of a joint: its number; nodes and heads of their outlets [m]; the part of their effect
-    that a crack in the elements beside them has left.
+    that remains with a crack in the elements beside them.
     """
 
     joint: int
     outlets: dict[int, float]
-    left: float
+    remaining: float
 
 
 @dataclass(frozen=True)
@@ -585,7 +585,7 @@ class Network:
 
     @cached_property
     def drain_lines(self) -> list[DrainLine]:
-        """The drains that a crack has left a part of their effect."""
+        """The drains of whose effect a part remains."""
         lines = []
         for k, joint in enumerate(self.joints):
             values = joint.values
@@ -601,11 +601,11 @@ class Network:
                 n: float(max(self.nodes[n, 1], values["drain_level"], joint.tail))
                 for n in own[here].tolist()
             }
-            left = 1.0
+            remaining = 1.0
             if values["uplift"] == "cracked":
-                left -= self.cracked_beside(k, own[here], float(s[here].mean()))
-            if left > NO_EFFECT:
-                lines.append(DrainLine(k, outlets, left))
+                remaining -= self.cracked_beside(k, own[here], float(s[here].mean()))
+            if remaining > NO_EFFECT:
+                lines.append(DrainLine(k, outlets, remaining))
         return lines
 
     def cracked_beside(self, joint: int, nodes: IntArray, place: float) -> float:
@@ -631,7 +631,7 @@ class Network:
         """Nodes of drains that fade. The elements beside them lose the head between crack and
         drains.
         """
-        return [n for line in self.drain_lines if line.left < 1 for n in line.outlets]
+        return [n for line in self.drain_lines if line.remaining < 1 for n in line.outlets]
 
     @cached_property
     def flow(self) -> Flow:
@@ -643,13 +643,13 @@ class Network:
         if not drains or not effect or any(free.heads[n] <= head for n, head in drains.items()):
             return free
         found, last = free, 0.0
-        for left in sorted({line.left for line in self.drain_lines}):
-            lines = [line for line in self.drain_lines if line.left >= left]
+        for remaining in sorted({line.remaining for line in self.drain_lines}):
+            lines = [line for line in self.drain_lines if line.remaining >= remaining]
             fixed = {n: head for line in lines for n, head in line.outlets.items()}
             layer = self.solve(False, fixed)
-            share = effect * (left - last)
+            share = effect * (remaining - last)
             found = found.plus(share, layer, free)
-            last = left
+            last = remaining
         return found
 
     @property

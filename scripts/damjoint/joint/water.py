@@ -49,7 +49,7 @@ class Drainage:
     """
 
     water: JointWater
-    left: float
+    remaining: float
     rate: Array
 
 
@@ -234,12 +234,12 @@ class JointWater:
         assert self.drains
         _, beside = self.drains
         if self.case["uplift"] != "cracked":
-            return Drainage(water=self, left=1.0, rate=np.zeros(len(beside)))
+            return Drainage(water=self, remaining=1.0, rate=np.zeros(len(beside)))
         (factor, growth), most = self.aperture(jump, variables), self.case.shared["crack_most"][0]
-        left = 1 - float(beside @ (factor - 1)) / most
-        if left < ROUND_OFF:
-            return Drainage(water=self, left=0.0, rate=np.zeros(len(beside)))
-        return Drainage(water=self, left=left, rate=-beside * growth / most)
+        remaining = 1 - float(beside @ (factor - 1)) / most
+        if remaining < ROUND_OFF:
+            return Drainage(water=self, remaining=0.0, rate=np.zeros(len(beside)))
+        return Drainage(water=self, remaining=remaining, rate=-beside * growth / most)
 
     def opened(
         self, jump: Array, variables: JointVariables, before_quake: BeforeQuake | None
@@ -489,7 +489,7 @@ class WaterSystem:
             for water, at in zip(self.members, opened, strict=True)
             if water.drains
         ]
-        acting = [drains for drains in all_drains if drains.left]
+        acting = [drains for drains in all_drains if drains.remaining]
         if not acting:
             return free
         nodes, outlet = outlets(acting, loading)
@@ -497,7 +497,7 @@ class WaterSystem:
         effect = acting[0].water.case["drain_effectiveness"]
         if not (at_drains > outlet).all() or effect == 0:
             return free
-        if all(drains.left == 1 for drains in acting):
+        if all(drains.remaining == 1 for drains in acting):
             return free.mixed(effect, solved(conductivity, nodes, outlet))
         return self.with_fading(free, acting, conductivity, loading, solved, before_quake)
 
@@ -517,28 +517,28 @@ class WaterSystem:
         effect = acting[0].water.case["drain_effectiveness"]
         shut, closed = np.zeros(len(conductivity), bool), conductivity.copy()
         for drains in acting:
-            if drains.left < 1:
+            if drains.remaining < 1:
                 water, of_joint = drains.water, self.slice_of(drains.water)
                 assert water.drains
                 shut[of_joint] = water.drains[1] > 0
                 closed[of_joint] = water.scale * water.joint.points.weights
         conductivity = np.where(shut, closed, conductivity)
-        # as much as is left of all drains, then as much as is left of all but the most faded ones
-        left, layers = sorted({drains.left for drains in acting}), list[FlowSolution]()
-        for least in left:
-            of_layer = outlets([drains for drains in acting if drains.left >= least], loading)
+        # as much as remains of all drains, then as much as remains of all but the most faded ones
+        shares, layers = sorted({drains.remaining for drains in acting}), list[FlowSolution]()
+        for least in shares:
+            of_layer = outlets([drains for drains in acting if drains.remaining >= least], loading)
             layers.append(solved(conductivity, *of_layer).closed_at(shut))
         mean = layers[0]
-        for (less, more), layer in zip(pairwise(left), layers[1:], strict=True):
+        for (less, more), layer in zip(pairwise(shares), layers[1:], strict=True):
             mean = layer.mixed(less / more, mean)
         fades = []
         for drains in acting:
-            if drains.left < 1 and not (before_quake and drains.water.freezes_uplift):
-                number, rate = left.index(drains.left), np.zeros(len(conductivity))
+            if drains.remaining < 1 and not (before_quake and drains.water.freezes_uplift):
+                number, rate = shares.index(drains.remaining), np.zeros(len(conductivity))
                 rate[self.slice_of(drains.water)] = drains.rate
                 with_it, without = [*layers, free][number : number + 2]
                 fades.append((effect * (with_it.pressure - without.pressure), rate))
-        return replace(free.mixed(effect * left[-1], mean), fades=fades)
+        return replace(free.mixed(effect * shares[-1], mean), fades=fades)
 
     def solve_in_time(
         self,

@@ -613,13 +613,13 @@ class EquilibriumPath:
 
     def pass_over(self, last: Point) -> None:
         """Append an equilibrium beyond a point, whether of its branch or not."""
-        beyond = self.by_relaxation(last) if self.relaxes else self.by_displacement(last)
-        self.ended = beyond is None
-        if beyond:
-            rise = max((beyond.level - last.level) / beyond.level, 1e-12)
-            by = beyond.imposed - self.imposed(last)
+        end = self.by_relaxation(last) if self.relaxes else self.by_displacement(last)
+        self.ended = end is None
+        if end:
+            rise = max((end.level - last.level) / end.level, 1e-12)
+            by = end.imposed - self.imposed(last)
             self.over = by * min(max(SMALL_RISE / rise, SHRINKING), GROWTH)
-            self.append([beyond], another=True)
+            self.append([end], another=True)
 
     def by_displacement(self, last: Point) -> Point | None:
         """The next equilibrium at a larger displacement of the crest; where it moves back, of the
@@ -637,9 +637,9 @@ class EquilibriumPath:
         for kind, by in [*tried, *(("crest", part * far) for part in JUMPS)]:
             if abs(by) <= LEAST * far:  # it would lead to the same point
                 continue
-            beyond = self.step(last, last.further(controls[kind], by), by, kind)
-            if beyond:
-                return beyond
+            end = self.step(last, last.further(controls[kind], by), by, kind)
+            if end:
+                return end
         return None
 
     def by_relaxation(self, last: Point) -> Point | None:
@@ -758,11 +758,11 @@ class EquilibriumPath:
         needed to show that a wanted level is out of reach.
         """
         for _ in range(MOST_REFINED):
-            left, possible = self.uncertain()
+            first, possible = self.uncertain()
             known = not possible - self.highest > PRECISION / 2 * possible
             if known or possible < wanted < np.inf:
                 return
-            self.insert(left, self.between(left))
+            self.insert(first, self.between(first))
 
     def first_branch(self: P) -> P:
         """The path up to the end of its first branch."""
@@ -834,12 +834,12 @@ class EquilibriumPath:
         falls = np.flatnonzero(levels < (1 - self.unstable_fall) * highest)
         return float(highest[falls[0]]) if len(falls) else None
 
-    def insert(self, left: int, new: list[Point]) -> None:
+    def insert(self, first: int, new: list[Point]) -> None:
         """Insert equilibria after a point of a number; none: no increment is of the branch."""
-        self.points[left + 1 : left + 1] = new
-        self.starts = [start + len(new) * (start > left + 1) for start in self.starts]
+        self.points[first + 1 : first + 1] = new
+        self.starts = [start + len(new) * (start > first + 1) for start in self.starts]
         if not new:
-            self.closed.append(self.points[left])
+            self.closed.append(self.points[first])
 
     def uncertain(self) -> tuple[int, float]:
         """Where the level may be highest: the number of the point before, and an upper bound [m];
@@ -852,48 +852,48 @@ class EquilibriumPath:
         if point.slides and not point.model.equilibrium.path_dependent:
             return top, self.highest
         last = min(self.counted, len(self.points) - 1)
-        bounds = [(self.bound(left), left) for left in range(last)]
-        possible, left = max(bounds, default=(self.highest, top))
-        return left, max(possible, self.highest)
+        bounds = [(self.bound(first), first) for first in range(last)]
+        possible, first = max(bounds, default=(self.highest, top))
+        return first, max(possible, self.highest)
 
-    def bound(self, left: int) -> float:
+    def bound(self, first: int) -> float:
         """An upper bound of the level [m] between a point and the next one, where the lines through
         their neighbours meet; -inf where no point can be inserted.
         """
-        a, b = self.points[left], self.points[left + 1]
-        if b.control == "level" or left + 1 in self.starts or any(a is p for p in self.closed):
+        a, b = self.points[first], self.points[first + 1]
+        if b.control == "level" or first + 1 in self.starts or any(a is p for p in self.closed):
             return -np.inf
-        before, beyond = self.slope(left - 1), self.slope(left + 1)
-        rise, length, ends = b.level - a.level, self.length(left), max(a.level, b.level)
+        before, after = self.slope(first - 1), self.slope(first + 1)
+        rise, length, ends = b.level - a.level, self.length(first), max(a.level, b.level)
         chord = rise / (length or 1.0)
-        if before is None or beyond is None:
+        if before is None or after is None:
             steepest = max(abs(chord), 0.0 if before is None else before)
             return max(ends + abs(rise), a.level + steepest * length)
-        if before > chord > beyond:  # where the lines through the neighbours meet
-            return a.level + before * (rise - beyond * length) / (before - beyond)
+        if before > chord > after:  # where the lines through the neighbours meet
+            return a.level + before * (rise - after * length) / (before - after)
         if before > chord:  # it may fall anywhere in between
             return max(ends, a.level + before * length)
-        return max(ends, b.level - beyond * length) if chord > beyond else ends
+        return max(ends, b.level - after * length) if chord > after else ends
 
-    def length(self, left: int) -> float:
+    def length(self, first: int) -> float:
         """How far the jumps move between a point and the next one [m]."""
-        a, b = self.points[left : left + 2]
+        a, b = self.points[first : first + 2]
         return float(np.abs(b.state.jump - a.state.jump).max())
 
-    def slope(self, left: int) -> float | None:
+    def slope(self, first: int) -> float | None:
         """Rise of the level over the movement between a point and the next one; None if they are
         not on one branch.
         """
-        if left < 0 or left + 1 >= len(self.points) or left + 1 in self.starts:
+        if first < 0 or first + 1 >= len(self.points) or first + 1 in self.starts:
             return None
-        a, b = self.points[left : left + 2]
-        return (b.level - a.level) / (self.length(left) or 1.0)
+        a, b = self.points[first : first + 2]
+        return (b.level - a.level) / (self.length(first) or 1.0)
 
-    def between(self, left: int) -> list[Point]:
+    def between(self, first: int) -> list[Point]:
         """Equilibria of the branch between a point and the next one."""
-        a, b = self.points[left : left + 2]
+        a, b = self.points[first : first + 2]
         control = a.towards(b.state.jump - a.state.jump)
-        length = self.length(left) / 2
+        length = self.length(first) / 2
         if control is None:
             return []
         smallest = max(SMALLEST * length, self.negligible(a, control))

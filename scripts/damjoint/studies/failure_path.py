@@ -130,8 +130,8 @@ class FailurePath(EquilibriumPath):
         smallest, at_rest = 0.5**HALVINGS, softened(point)
         for target in self.case.times:
             length = np.inf
-            while (left := target - point.state.time) > SAME_TIME:
-                new = self.by_level(point, min(length, left))
+            while (remaining := target - point.state.time) > SAME_TIME:
+                new = self.by_level(point, min(length, remaining))
                 if not new:
                     return
                 end, length = new[-1], new[-1].state.time - point.state.time
@@ -335,10 +335,10 @@ class FailurePath(EquilibriumPath):
     # -- refinement of its end
     # ----------------------------------------------------------------------------------------------
 
-    def insert(self, left: int, new: list[Point]) -> None:
+    def insert(self, first: int, new: list[Point]) -> None:
         """Insert equilibria; if the toe is crushed at one of them, it is the last one."""
-        super().insert(left, new)
-        for number in range(left + 1, left + 1 + len(new)):
+        super().insert(first, new)
+        for number in range(first + 1, first + 1 + len(new)):
             if self.crushes(self.points[number]):
                 del self.points[number + 1 :]
                 return
