@@ -158,7 +158,7 @@ def picture_table(check: SafetyCheck) -> list[tuple[str, ...]]:
         cells.append(("N' in", *(result.position for result in check.results), where))
     if check.finite_elements.partial:
         cells.insert(1, ("load", "partial", "full", *("full" for _ in longer), ""))
-    return [*cells, ("", *(result.verdict for result in check.results), "")]
+    return [*cells, ("check", *(result.verdict for result in check.results), "")]
 
 
 def joints_table(checks: list[SafetyCheck]) -> list[tuple[str, ...]]:

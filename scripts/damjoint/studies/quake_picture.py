@@ -128,8 +128,9 @@ def draw_stress(picture: Figure, axes: Axes, result: QuakeResult) -> None:
         stress["time"][::step], stress["s"], values, shading="nearest", rasterized=True, **colors
     )
     axes.set_xlim(0, times[-1])
-    of_first = f",\n{result.case.named((0,))}" if result.case.of_joints else ""
-    axes.set_ylabel(f"s from heel [m]{of_first}", fontsize=8)
+    if result.case.of_joints:
+        axes.set_title(f"stress along {result.case.named((0,))}", loc="right", fontsize=7, pad=3)
+    axes.set_ylabel("s from heel [m]", fontsize=8)
     axes.set_xlabel("t [s]", fontsize=8)
     axes.tick_params(labelsize=8)
     box = axes.get_position()

@@ -161,15 +161,17 @@ def lift_offs(quake: Earthquake, rows: Table) -> list[str]:
         period = 2 * math.pi * math.sqrt(mass / (own["K_N"] * own.joint_along))
         shortest = min(shortest, period)
         first, share = rows["time"][lifted][0], rows["dt"][lifted].sum() / rows["dt"].sum()
+        where = case.named((number,)) or "the joint"
+        start = f"; {where}: " if said else f"what is above {where} lifts off and lands again, "
         said.append(
-            f"{case.named((number,)) or 'the joint'} lifts off and lands again, {landings} "
-            f"time{'s' if landings > 1 else ''} from t = {first:.3f} s on, {share:.0%} of the time"
+            f"{start}{landings} time{'s' if landings > 1 else ''} from t = {first:.3f} s on, "
+            f"{share:.0%} of the time"
         )
     if not said:
         return []
     text = (
-        f"what is above {'; above '.join(said)}: the contact is elastic, without damping of an "
-        "impact but by joint_damping_n"
+        f"{''.join(said)}: the contact is elastic, without damping of an impact but by "
+        "joint_damping_n"
     )
     if shortest < STEPS_OF_IMPACT * quake.dt:
         text += (
