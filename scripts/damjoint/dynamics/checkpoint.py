@@ -23,7 +23,6 @@ from ..storage import read_entry, write_entry
 from . import record_files
 from .history import Peak, QuakeHistory
 from .scheme import Motion
-from .step import Moving
 from .stepper import Earthquake
 
 
@@ -68,7 +67,7 @@ def write(path: Path, key: str, quake: Earthquake, history: QuakeHistory) -> Non
     content: dict[str, Any] = {
         "time": np.array(now.time),
         "jump": now.state.jump,
-        "motion": np.array(list(leaves(now.motion))),
+        "motion": np.array(list(leaves(now.kept))),
         "forces": now.forces,
         "columns": np.array(list(history.rows)),
         "rows": np.array(list(history.rows.values())),
@@ -124,10 +123,11 @@ def read(path: Path, key: str, quake: Earthquake, history: QuakeHistory) -> None
     names = stored["peaks"].tolist()
     values = zip(stored["peak_values"].tolist(), stored["peak_states"], strict=True)
     peaks = {n: Peak(v[0], v[1], w) for n, (v, w) in zip(names, values, strict=True)}
-    now = Moving(
+    now = replace(
+        quake.problem.at_rest,
         time=float(stored["time"]),
         state=state,
-        motion=Motion(*stored["motion"]),
+        kept=Motion(*stored["motion"]),
         forces=stored["forces"],
     )
     history.rows, history.frames, history.stress, history.peaks = rows, frames, stress, peaks

@@ -34,7 +34,7 @@ class Frames:
     interval: float
     span: tuple[float, float]
     history: History
-    #: since the static state (n,)
+    #: of `Problem.kept` since the static state (k,)
     displacement: list[Array] = field(default_factory=list)
 
     @staticmethod
@@ -62,8 +62,8 @@ class Frames:
         state = replace(moving.state, time=moving.time)
         history = self.history
         history.add(StepResult(state, iterations, residual), 0)
-        moved = moving.motion.displacement
-        history.rows["crest_ux"][-1] = float((quake.system.crest @ moved)[0])
+        moved = moving.kept.displacement
+        history.rows["crest_ux"][-1] = float((quake.problem.crest @ moved)[0])
         history.save(state)
         history.saved.clear()  # the tables have all that is needed of it
         self.displacement.append(moved)
@@ -82,7 +82,7 @@ class Frames:
 
     def fields(self, quake: Earthquake, static: Field) -> dict[float, Field]:
         """Displacement and stress by time, those of the static state included."""
-        moved = np.array(self.displacement).T
+        moved = quake.problem.whole(np.array(self.displacement).T)
         displacement, stresses, nodes = {}, {}, {}
         material, dim = material_of(quake.case), quake.bodies.mesh.dim
         for name, matrix in quake.system.motion.items():

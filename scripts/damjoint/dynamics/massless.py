@@ -73,8 +73,8 @@ class MasslessRock:
         return (matrix.tocsr()[self.kept][:, self.kept] + at_edge).tocsr()
 
     def expand(self, displacement: Array) -> Array:
-        """All unknowns (n,), from those of `kept` (k,)."""
-        whole = np.empty(len(self.kept) + len(self.inside))
+        """All unknowns (n, ...), from those of `kept` (k, ...)."""
+        whole = np.empty((len(self.kept) + len(self.inside), *displacement.shape[1:]))
         whole[self.kept] = displacement
         whole[self.inside] = self.follow @ displacement[self.edge]
         return whole

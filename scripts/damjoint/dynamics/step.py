@@ -12,10 +12,11 @@ the equation of joint/problem.py, solved by the same laws and strategies as at r
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Array, Sparse
+from ..arrays import Array, IntArray, Sparse
 from ..fem.factor import partial_factors
 from ..joint.equilibrium import Equilibrium
 from ..joint.flow_in_time import TimeStep as WaterStep
@@ -39,9 +40,21 @@ class Moving:
 
     time: float
     state: State
-    motion: Motion
+    #: of the unknowns of the steps, see `Problem.kept`
+    kept: Motion
     #: g: change of the joints' nodal forces, dashpots and water included, since the static state
     forces: Array
+    #: what follows them
+    rock: MasslessRock | None = None
+
+    @property
+    def motion(self) -> Motion:
+        """Of all unknowns (n,)."""
+        kept = self.kept
+        if not self.rock:
+            return kept
+        parts = kept.displacement, kept.velocity, kept.acceleration
+        return Motion(*map(self.rock.expand, parts))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,12 +73,29 @@ class Problem:
     #: that follows the bodies on it; None: it is eliminated in each step
     rock: MasslessRock | None = None
 
+    @cached_property
+    def kept(self) -> IntArray:
+        """The unknowns of the steps (k,), of all (n,): without the rock that follows them."""
+        return self.rock.kept if self.rock else np.arange(self.system.size)
+
+    @cached_property
+    def crest(self) -> Sparse:
+        """Displacement of the crest along x and y (2, k)."""
+        return self.system.crest[:, self.kept]
+
+    def whole(self, kept: Array) -> Array:
+        """The displacement of all unknowns (n, ...) from that of `kept` (k, ...)."""
+        return self.rock.expand(kept) if self.rock else kept
+
     @property
     def at_rest(self) -> Moving:
         """The static state."""
-        forces = np.zeros(len(self.system.jumps))
         return Moving(
-            time=0.0, state=self.static, motion=Motion.at_rest(self.system.size), forces=forces
+            time=0.0,
+            state=self.static,
+            kept=Motion.at_rest(len(self.kept)),
+            forces=np.zeros(len(self.system.jumps)),
+            rock=self.rock,
         )
 
 
@@ -82,7 +112,7 @@ class TimeStep:
         matrices, rock = (system.mass, system.stiffness, problem.damping), problem.rock
         #: mass, stiffness and damping of the unknowns of the steps (k, k), and the jumps among them
         self.mass, self.of_bodies, self.damping = map(rock.reduce, matrices) if rock else matrices
-        self.jumps = np.searchsorted(rock.kept, system.jumps) if rock else system.jumps
+        self.jumps = np.searchsorted(problem.kept, system.jumps)
         matrix = acceleration * self.mass + weight * (self.of_bodies + self.rate * self.damping)
         self.factors = partial_factors(matrix.tocsr(), self.jumps)
         #: S (j, j)
@@ -124,7 +154,7 @@ class TimeStep:
         lifted = lift(equilibrium, pressure, water)
         joints = self.joint_problem(begin, start.variables, self.on_jumps(begin, loads, lifted))
         joints = replace(joints, water=water)
-        ahead = now.jump + self.dt * begin.motion.velocity[self.problem.system.jumps]
+        ahead = now.jump + self.dt * begin.kept.velocity[self.jumps]
         both = ((jump, joints.residual(jump, loading)) for jump in (now.jump, ahead))
         guess, residual = min(both, key=lambda pair: float(np.linalg.norm(pair[1].value)))
         strategies = model.strategies
@@ -156,11 +186,9 @@ class TimeStep:
 
     def on_jumps(self, begin: Moving, loads: tuple[Array, Array], lifted: Array) -> Array:
         """The loads (j,) of a step, see `advance`; lifted: of the water in the joints."""
-        problem, motion, static = self.problem, begin.motion, self.problem.static
+        problem, motion, static = self.problem, begin.kept, self.problem.static
         alpha, weight = problem.scheme.shift, self.weight
-        load = weight * loads[1] - alpha * loads[0]
-        if problem.rock:
-            motion, load = motion.at(problem.rock.kept), load[problem.rock.kept]
+        load = (weight * loads[1] - alpha * loads[0])[problem.kept]
         of_velocity, of_acceleration = problem.scheme.history(motion, self.dt)
         right = self.mass @ of_acceleration
         if self.damping.nnz:
@@ -190,9 +218,9 @@ class TimeStep:
 
     def dashpots(self, begin: Moving) -> Dashpots:
         """The dashpots of the points that are closed when a step begins."""
-        interface, jumps = self.equilibrium.interface, self.problem.system.jumps
-        of_velocity, _ = self.problem.scheme.history(begin.motion, self.dt)
-        resting = self.problem.static.jump + of_velocity[jumps] / self.rate
+        interface = self.equilibrium.interface
+        of_velocity, _ = self.problem.scheme.history(begin.kept, self.dt)
+        resting = self.problem.static.jump + of_velocity[self.jumps] / self.rate
         before, at_rest = (
             interface.jumps(interface.at_points, jump) for jump in (begin.state.jump, resting)
         )
@@ -200,16 +228,14 @@ class TimeStep:
 
     def moved(self, begin: Moving, state: State, joints: JointProblem, lifted: Array) -> Moving:
         """The dam after a step to a state, by the problem that has led to it."""
-        interface, motion = self.equilibrium.interface, begin.motion
         traction = joints.traction(state.jump)
         displacement = self.factors.expand(state.jump - self.problem.static.jump)
-        if self.problem.rock:
-            displacement = self.problem.rock.expand(displacement)
-        return Moving(
+        return replace(
+            begin,
             time=begin.time + self.dt,
             state=state,
-            motion=self.problem.scheme.step(motion, displacement, self.dt),
-            forces=interface.forces(traction) - lifted - self.at_static,
+            kept=self.problem.scheme.step(begin.kept, displacement, self.dt),
+            forces=self.equilibrium.interface.forces(traction) - lifted - self.at_static,
         )
 
 

@@ -121,20 +121,22 @@ class Friction(Law[FrictionVariables]):
         """See `Law`; the tangent is not symmetric."""
         normal, size, n, slip = self.trial(jump, variables)
         traction = np.column_stack([normal, (size - self.K_T * slip)[:, None] * n])
-        closed, slides = ~self.is_open(jump, variables), slip > 0
         tangent = np.zeros((len(jump), 3, 3))
         tangent[:, 0, 0] = self.normal_stiffness(jump, variables)
-        across = np.where(slides, 1 - self.K_T * slip / np.maximum(size, 1e-300), 1.0)
-        along = np.where(slides, self.H / (self.K_T + self.H), 1.0)
-        outer, eye = n[:, :, None] * n[:, None, :], np.eye(2)
-        tangent[:, 1:, 1:] = self.K_T * (
-            across[:, None, None] * (eye - outer)
-            + along[:, None, None] * outer
-            + self.artificial * slides[:, None, None] * eye
+        tangent[:, 1, 1] = tangent[:, 2, 2] = self.K_T
+        slides = np.flatnonzero(slip)
+        if not len(slides):
+            return traction, tangent
+        n, eye = n[slides], np.eye(2)
+        across = 1 - self.K_T * slip[slides] / np.maximum(size[slides], 1e-300)
+        along = self.H / (self.K_T + self.H)
+        outer = n[:, :, None] * n[:, None, :]
+        tangent[slides, 1:, 1:] = self.K_T * (
+            across[:, None, None] * (eye - outer) + along * outer + self.artificial * eye
         )
-        tangent[~slides, 1:, 1:] = self.K_T * eye  # whatever the direction, without rounding
         coupling = -self.K_T / (self.K_T + self.H) * self.mu * self.K_N
-        tangent[:, 1:, 0] = np.where(slides & closed, coupling, 0)[:, None] * n
+        closed = ~self.is_open(jump, variables)[slides]
+        tangent[slides, 1:, 0] = np.where(closed, coupling, 0)[:, None] * n
         return traction, tangent
 
     def secant_stiffness(self, jump: Array, variables: FrictionVariables) -> Array:

@@ -231,8 +231,9 @@ class QuakeRun:
         """The states with the largest displacements, see `QuakeResult`."""
         if self.quake.case["dim"] == 3:
             return []
+        system, whole = self.quake.system, self.quake.problem.whole
         return [
-            (name, peak.time, at_nodes(self.quake.system, peak.displacement))
+            (name, peak.time, at_nodes(system, whole(peak.displacement)))
             for name, peak in self.history.peaks.items()
             if peak.value > 0  # the joint may stay closed
         ]
