@@ -9,6 +9,7 @@ import pytest
 from damjoint import progress
 from damjoint.fem.memory import bulk_size, joint_size, joints_size, seconds, sizes
 from damjoint.input.resolve import load
+from damjoint.mesh.mesh import mesh_of
 from damjoint.progress import Progress, track
 
 SMALL = ("--set", "n_joint=10", "--set", "h_dam=15", "--set", "h_found=60")
@@ -134,9 +135,29 @@ def test_the_forecast_grows_with_bodies_joints_and_steps():
     """
     lifts = {"lift_heights": tuple(45 * k / 8 for k in range(1, 8))}
     plain, of_lifts = load("dam", {}), load("dam", lifts)
-    fine = load("dam", {"n_joint": 400.0})
+    fine = load("dam", {"h_dam": 0.3, "h_found": 0.6})
     scale = bulk_size(fine) / 1.07e6
     assert seconds(fine) == pytest.approx(26 * scale**1.12, rel=0.5)
     bodies = seconds(plain) * (bulk_size(of_lifts) / bulk_size(plain)) ** 1.12
     assert 0.5 < (seconds(of_lifts) - bodies) / (joints_size(of_lifts) / 1616) ** 3 < 2.5
     assert seconds(load("dam", lifts, steps=50)) > 1.1 * seconds(of_lifts)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {},
+        {"dam_base": 4e4},
+        {"found_side": 1e3},
+        {"found_depth": 2e3},
+        {"dim": 3.0, "n_layers": 2.0, "n_joint": 30.0},
+    ],
+)
+def test_the_unknowns_of_the_bodies_are_forecast(settings):
+    """Of the mesh, within a factor of five: also where the joint's elements are longer than a body
+    is high, and in a large foundation.
+    """
+    case = load("dam", settings)
+    dim = case["dim"]
+    of_mesh = dim * mesh_of(case).nodes * case["order"] ** dim  # of the corners
+    assert 1 / 5 < bulk_size(case) / of_mesh < 5

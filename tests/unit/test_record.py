@@ -89,6 +89,8 @@ UNEVEN = [0, 0.005, 0.010, 0.010001, 0.015, 0.020]
         ([0, 0.01, 0.02], {"record_rest": 1e30}, r"record_rest = 1e.30: must lead to .*2e.32 of"),
         ([0, 5e5, 1e6], {"dt": 0.5}, "dt = 0.5: must lead to at most"),
         ([0, 1, 2, 1e9], {}, r"row 5: t = 1e.09 s: must lead to"),
+        ([0, 10, 20], {}, r"dt = -1, half the .*r.csv: must be <= 0.1 s, not 5 s; .*times in s"),
+        ([0, 1, 2], {"dt": 0.5}, "dt = 0.5: must be <= 0.1 s"),
         ([0, 1, 2], {"record_scale": 1e300}, "row 3: must be at most 1000 g"),
     ],
 )

@@ -24,6 +24,8 @@ DIGITS = 0.01
 
 #: Limit of the time steps of an earthquake.
 MOST_STEPS = 1_000_000
+#: The longest time step [s]; dams vibrate with periods of 0.1 to 1 s.
+LONGEST_STEP = 0.1
 
 #: Velocity of the ground at the end of a record over its largest one, beyond which the record has
 #: an offset.
@@ -173,9 +175,14 @@ def check_steps(case: Case, times: Array, lines: IntArray) -> None:
     duration = float(times[-1]) - case["record_start"]
     step = shortest / 2 if dt == -1 else dt
     number = (duration + rest) / max(step, TINY)
-    if number <= MOST_STEPS:
-        return
     cause = f"dt = {dt:g}" + (f", half {limit}" if dt == -1 else "")
+    if number <= MOST_STEPS:
+        if step > LONGEST_STEP * (1 + DIGITS):
+            raise InputError(
+                f"{cause}: must be <= {LONGEST_STEP:g} s, not {step:g} s; are the record's times "
+                "in s?"
+            )
+        return
     if duration + rest > typical / 2 * MOST_STEPS:
         longest = f"{name}, row {lines[-1]}: t = {times[-1]:g} s"
         cause = f"record_rest = {rest:g}" if rest > duration else longest

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import resource
 from pathlib import Path
@@ -43,16 +44,19 @@ PER_UNKNOWN = 2400
 
 
 def bulk_size(case: Case) -> float:
-    """Estimate the number of unknowns of all bodies.
+    """Estimate the number of unknowns of all bodies, within a factor of five.
 
-    A triangle covers half of the product of the element sizes at both ends of its body; order 2 has
-    four unknowns a triangle. (Prisms and tetrahedra: within a factor of three.)
+    A triangle covers half of the square of its size. From the joint, whose elements are no larger
+    there than a body is high, sizes grow to those of the crest and of the foundation's boundary;
+    beside the joint with the distance from it. Order 2 has four unknowns a triangle.
     """
     dim, order, near = int(case["dim"]), int(case["order"]), case.joint_length / case["n_joint"]
-    dam = (case["dam_base"] + case["dam_crest"]) / 2 * case["dam_height"]
-    foundation = (case["dam_base"] + 2 * case["found_side"]) * case["found_depth"]
-    triangles = 2 * (dam / (near * case["h_dam"]) + foundation / (near * case["h_found"]))
-    return triangles * order**2 * (1 if dim == 2 else 1.5 * case["n_layers"])
+    height, depth, far = case["dam_height"], case["found_depth"], case["h_found"]
+    dam = (case["dam_base"] + case["dam_crest"]) / 2 / case["h_dam"] / min(near / height, 1)
+    below = case["dam_base"] / far / min(near / depth, 1)
+    beside = 2 * case["found_side"] * depth / far**2 * (1 + max(math.log(far / near), 0))
+    triangles = 2 * (dam + below + beside)
+    return triangles * order**2 * (1 if dim == 2 else 4.5 * case["n_layers"])
 
 
 def joints_size(case: Case) -> int:
