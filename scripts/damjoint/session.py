@@ -10,12 +10,12 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from . import versions
 from .fem.memory import seconds, sizes
 from .input.case import Case
-from .model.results import Results
+from .model.results import Info, Results
 from .post import folder as folders
 from .post import tables
 from .progress import INTERVAL, Progress
@@ -105,7 +105,8 @@ class Session(Record):
         self.ended = True
         info = result.info
         info.setdefault("wall_seconds", {})["post"] = time.perf_counter() - start
-        info |= versions.provenance(info.pop("getdp", {})) | {"notes": self.notes}
+        about = versions.provenance(info.pop("getdp", {}))
+        info |= cast(Info, about | {"notes": self.notes})
         folders.write_info(result, folder, state, statement)
 
     def add(self, result: Results, write: Callable[[Path], object]) -> None:

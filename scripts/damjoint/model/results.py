@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypedDict
 
 import numpy as np
 
@@ -213,6 +213,52 @@ def quake_columns(case: Case) -> Columns:
     return with_all_joints(QUAKE | in_time, case, QUAKE_OF_JOINTS)
 
 
+class Info(TypedDict, total=False):
+    """About the run itself, entries of run.json; all others are those of `folder.write_info`."""
+
+    #: the mechanism at the end of a path, see `Mechanism`
+    mechanism: dict[str, Any]
+    #: whether the weight alone has not converged, and acts with the first level
+    weight_with_water: bool
+    #: level of each limit point, and the lowest one after it [m]
+    limit_points: Sequence[tuple[float, float]]
+    #: levels of unstable crack growth [m]
+    unstable_growth: Sequence[float]
+    #: time [-] of the largest change of the water pressure beyond that of the levels, and this [Pa]
+    pressure_moves: tuple[float, float]
+    #: how the last solution ended without an equilibrium
+    end_of_solution: str
+    #: times of the steps that rounding keeps from the tolerance
+    converged_by_round_off: Sequence[float]
+    engine: str
+    factorisation: str
+    mesh: dict[str, Any]
+    unknowns: int | None
+    #: [s] by part of the work
+    wall_seconds: dict[str, Any]
+    #: of --accuracy; of critical, calibrate, quake and --sensitivity
+    error_estimate: dict[str, Any]
+    critical: dict[str, Any]
+    calibration: dict[str, Any]
+    quake: dict[str, Any]
+    sensitivity: dict[str, Any]
+    #: whether the fields are those of the frames of an earthquake
+    frames: bool
+    notes: Sequence[str]
+    key: str
+    #: version and memory of GetDP
+    getdp: dict[str, Any]
+    peak_memory_mb: float
+    versions: dict[str, str]
+    commit: str
+    machine: str
+    #: of stored results
+    state: str
+    verdict: str
+    statement: str
+    hints: list[str]
+
+
 @dataclass
 class Results:
     """The results of a run: tables as {column: array}. With several joints, each of `joints` are
@@ -233,8 +279,7 @@ class Results:
     heel: Array = field(default_factory=lambda: np.zeros(0))
     #: of a case with `all_steps`: its updates of the internal variables, see `step_columns`
     steps: Table | None = None
-    #: about the run itself, for run.json: engine, sizes, versions, seconds
-    info: dict[str, Any] = field(default_factory=dict)
+    info: Info = field(default_factory=lambda: Info())
 
     @property
     def joints(self) -> list[Results]:

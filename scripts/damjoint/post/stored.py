@@ -6,7 +6,7 @@ import csv
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import meshio
 import numpy as np
@@ -20,7 +20,7 @@ from ..input.parameters import GEOMETRY_LISTS, constants, declared, listing
 from ..input.scene import numbered
 from ..mesh.body import Body
 from ..model.fields import Field, Solution
-from ..model.results import Results, history_columns
+from ..model.results import Info, Results, history_columns
 from .field_files import DISPLACEMENT, STRESS
 from .folder import read_info, scene_folders
 
@@ -80,9 +80,8 @@ def read_results(info: dict[str, Any], folder: Path) -> Results:
     heel = np.zeros(0)
     if case["drive"] != "level":
         heel = read_csv(folder / "curve.csv")["heel_opening"]
-    return Results(
-        case, history, joint, {}, stopped=info["state"] == "stopped", heel=heel, info=info
-    )
+    stopped = info["state"] == "stopped"
+    return Results(case, history, joint, {}, stopped, heel, info=cast(Info, info))
 
 
 def case_of(info: dict[str, Any]) -> Case:

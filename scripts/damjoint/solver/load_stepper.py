@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import asdict, dataclass, replace
+from typing import cast
 
 import numpy as np
 
 from ..input.case import Case
 from ..joint.interface import Interface
 from ..model.loads import Loading, Unknown
-from ..model.results import Results
+from ..model.results import Info, Results
 from .controls import Control, DissipationControl, LevelControl, drive_of, work_of
 from .history import History
 from .model import Model, StepOptions, StepResult
@@ -445,7 +446,7 @@ class LoadStepper:
             "end_of_solution": self.end_of_solution,
             "converged_by_round_off": self.history.by_round_off,
         }
-        results.info = {name: value for name, value in info.items() if value}
+        results.info = cast(Info, {name: value for name, value in info.items() if value})
         if self.state.trace:
             results.steps = trace_table(self.model.equilibrium, self.state.trace)
         return results

@@ -12,6 +12,7 @@ from ..engines.condensed.solve import about
 from ..input import parameters
 from ..input.case import Case
 from ..input.written_case import case_text
+from ..model.results import Info
 from ..post.summary import aligned
 from ..post.tables import Column, write_csv
 from ..session import Session, preparation, session
@@ -68,7 +69,7 @@ def save(study: Session, answer: Calibration, picture: bool) -> None:
     stepper = answer.stepper
     assert stepper
     result = stepper.results()
-    entries = {"calibration": as_json(answer), "wall_seconds": {"search": study.seconds}}
+    entries: Info = {"calibration": as_json(answer), "wall_seconds": {"search": study.seconds}}
     result.info |= about(stepper.model.equilibrium.bulk) | entries
     study.save(result, more=partial(write_tables, answer))
     file = study.out / "calibrated.case"

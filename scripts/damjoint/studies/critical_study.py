@@ -16,7 +16,7 @@ from ..fem.bodies import Bodies
 from ..input.case import Case
 from ..laws import Evidence
 from ..model.fields import Solution
-from ..model.results import Results, row_of_joint
+from ..model.results import Info, Results, row_of_joint
 from ..post import folder as folders
 from ..post.field_files import write_fields
 from ..post.tables import write_csv
@@ -141,7 +141,7 @@ def save(study: Session, search: Search, answer: CriticalValue) -> None:
     """Write the last equilibrium as `damjoint run` does, critical.csv and its picture."""
     state, _ = end_of(answer.error)
     shown = content(search, answer)
-    entries = {"critical": as_json(search, answer), "wall_seconds": {"search": study.seconds}}
+    entries: Info = {"critical": as_json(search, answer), "wall_seconds": {"search": study.seconds}}
     result, solution = shown.result, shown.solution
     if answer.point and result:
         result.info = about(answer.point.model.equilibrium.bulk) | entries

@@ -20,7 +20,7 @@ from ..dynamics.record_files import STANDARD_GRAVITY
 from ..input.case import Case
 from ..input.case_names import is_name
 from ..model.fields import Solution
-from ..model.results import Results
+from ..model.results import Info, Results
 from ..pictures import run_picture
 from ..pictures.drawing import figure_of, picture_style
 from ..pictures.report_picture import Picture, bands, embedded
@@ -614,7 +614,7 @@ def critical_value(info: dict[str, Any] | None) -> str:
     return f"the last state before failure, critical {info['of']} {'; '.join(parts)}"
 
 
-def earthquake(info: dict[str, Any]) -> str:
+def earthquake(info: Info) -> str:
     """Statement of `damjoint quake`, if run.json has it."""
     summary = info.get("quake")
     if not summary or "at_rest" not in summary:
@@ -655,7 +655,7 @@ def computation(result: Results) -> dict[str, str]:
     }
 
 
-def versions(info: dict[str, Any]) -> dict[str, str]:
+def versions(info: Info) -> dict[str, str]:
     """Versions, factorisation and machine of a run; runs of earlier versions lack some."""
     others = {name: info.get(name) for name in ("commit", "factorisation", "machine")}
-    return info["versions"] | {name: text for name, text in others.items() if text}
+    return info["versions"] | {name: str(text) for name, text in others.items() if text}

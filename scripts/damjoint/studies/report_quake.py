@@ -15,7 +15,7 @@ from ..dynamics import ground_motion
 from ..dynamics.record import Record
 from ..dynamics.record_files import STANDARD_GRAVITY
 from ..input.case import Case
-from ..model.results import column_of
+from ..model.results import Info, column_of
 from ..pictures.drawing import BLUE, DARK, ORANGE, figure_of, panels
 from ..pictures.report_picture import Picture, bands, embedded
 from ..post import stored
@@ -44,7 +44,7 @@ class Earthquake:
     notes: list[str]
 
 
-def read(folder: Path, case: Case, info: dict[str, Any]) -> Earthquake | None:
+def read(folder: Path, case: Case, info: Info) -> Earthquake | None:
     """The earthquake of a folder, if its run.json has results of `damjoint quake`.
 
     Raises OSError, ValueError if its table is damaged.
@@ -55,7 +55,7 @@ def read(folder: Path, case: Case, info: dict[str, Any]) -> Earthquake | None:
     rows = stored.read_csv(folder / "quake.csv")
     # from rest at t = 0, where the table has no row
     rows = {name: np.append(0.0, rows[name]) for name in ("time", "ground_ax", "ground_ay")}
-    path, first = folder / f"{info['case']}_quake.png", 1 / summary["frequencies"][0]
+    path, first = folder / f"{case.name}_quake.png", 1 / summary["frequencies"][0]
     pictures = list[Picture]()
     if path.is_file():
         caption = "Earthquake: relative to the ground, since the static state before it."

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ... import RunError
 from ...csr import CsrMatrix
@@ -18,6 +18,7 @@ from ...joint.interface import Interface
 from ...joint.linear_system import Stalled
 from ...mesh.mesh import mesh_of
 from ...model.network import with_paths
+from ...model.results import Info
 from ...solver.load_stepper import LoadStepper
 from ...threads import limited_threads
 from .. import OnStep, Outcome
@@ -37,7 +38,7 @@ def check(case: Case) -> None:
         with_paths(case.with_joints([joint.of_case for joint in joints]), joints)
 
 
-def about(bulk: Condensed) -> dict[str, Any]:
+def about(bulk: Condensed) -> Info:
     """Entries of run.json on the engine and its mesh."""
     return {
         "engine": "iterative" if isinstance(bulk.stiffness, CsrMatrix) else "condensed",

@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from ...mesh.chord import Chord
 from ...mesh.joint_mesh import heel_normal
 from ...mesh.mesh import Mesh
 from ...mesh.sides import area
+from ...model.results import Info
 from ...storage import check_end
 from .paths import has_level_ends, lines, values_of_paths
 
@@ -208,7 +208,7 @@ class Usage:
     wall: float | None = None
     memory: float | None = None
 
-    def about(self, mesh: Mesh, seconds: dict[str, float | None]) -> dict[str, Any]:
+    def about(self, mesh: Mesh, seconds: dict[str, float | None]) -> Info:
         """Entries of run.json on the engine, its mesh and its wall seconds."""
         return {
             "engine": "getdp",
