@@ -1,19 +1,21 @@
-/* Search by section: ranked by how often and how rarely the words occur, those in headings more, with
-   an excerpt. The texts are in search_text.js, as a browser fetches no page from a disk. */
+/* Search by section: ranked by how rare the words are and how often they occur for its length (BM25),
+   those in headings more, with an excerpt. The texts are in search_text.js, as a browser fetches no page from a disk. */
 const inSections = {
   /* Page, heading, anchor and score of the best section of each page that has all words. */
   find: (sections, words) => {
     const has = (text, word) => text.split(word).length - 1;
     const rare = words.map((word) =>
       Math.log(1 + sections.length / (1 + sections.filter((s) => s.lower.includes(word)).length)));
+    const mean = sections.reduce((sum, s) => sum + s.lower.length, 0) / sections.length;
     const best = new Map(), found = new Map();
     for (const section of sections) {
       let score = 0;
+      const long = 0.3 + 0.9 * section.lower.length / mean;
       const all = found.get(section.page) || new Set();
       words.forEach((word, k) => {
         const often = has(section.lower, word);
         if (often) all.add(word);
-        score += rare[k] * (Math.log(1 + often) + (section.heading.toLowerCase().includes(word) ? 2 : 0));
+        score += rare[k] * (2.2 * often / (often + long) + (section.heading.toLowerCase().includes(word) ? 2 : 0));
         if (!often) score -= 2 * rare[k]; // a section with all words is better
       });
       found.set(section.page, all);
