@@ -6,6 +6,7 @@ from closed_forms import BASE, WATER, differences
 from damjoint import runner
 from damjoint.input.resolve import load
 from damjoint.statics import gravity
+from damjoint.statics.hints import hints
 from numpy.testing import assert_allclose
 
 
@@ -131,3 +132,4 @@ def test_a_crack_ends_the_effect_of_drains_while_it_grows_through_an_element(sol
     head = 78 * (1 - 2 / 3 * 13 / 18)
     force = WATER * ((78 + head) / 2 * 6 + head / 2 * 54)
     assert result.last["U"] == pytest.approx(force, rel=1e-5)
+    assert "in the element before the drains (6 m)" in "\n".join(hints(result))

@@ -187,6 +187,13 @@ def hints_on_state(results: Results, last: dict[str, float]) -> list[str]:
         messages.append(
             f"the crack ({crack:.3g} m) has passed the drains ({case['drain_x']:g} m){unchanged}"
         )
+    fades = has_drains(case) and case["uplift"] == "cracked" and not case.geometry
+    if fades and crack and case["drain_x"] - element < crack <= case["drain_x"]:
+        messages.append(
+            f"the crack ({crack:.3g} m) ends in the element before the drains "
+            f"({case['drain_x']:g} m), in which it ends their effect by and by: the uplift depends "
+            "on the mesh there"
+        )
     if len(results.joint["time"]) and not case.law.open_tension * crack:
         rows = results.at()
         heel = rows["sigma_n_eff"][rows["s"] <= rows["s"].min()].mean()
