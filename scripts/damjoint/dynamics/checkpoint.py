@@ -67,7 +67,7 @@ def write(path: Path, key: str, quake: Earthquake, history: QuakeHistory) -> Non
     content: dict[str, Any] = {
         "time": np.array(now.time),
         "jump": now.state.jump,
-        "motion": np.array(list(leaves(now.kept))),
+        "motion": np.array(list(leaves(now.retained))),
         "forces": now.forces,
         "columns": np.array(list(history.rows)),
         "rows": np.array(list(history.rows.values())),
@@ -127,7 +127,7 @@ def read(path: Path, key: str, quake: Earthquake, history: QuakeHistory) -> None
         quake.problem.at_rest,
         time=float(stored["time"]),
         state=state,
-        kept=Motion(*stored["motion"]),
+        retained=Motion(*stored["motion"]),
         forces=stored["forces"],
     )
     history.rows, history.frames, history.stress, history.peaks = rows, frames, stress, peaks

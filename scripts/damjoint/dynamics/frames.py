@@ -34,7 +34,7 @@ class Frames:
     interval: float
     span: tuple[float, float]
     history: History
-    #: of `Problem.kept` since the static state (k,)
+    #: of `Problem.retained` since the static state (k,)
     displacement: list[Array] = field(default_factory=list)
 
     @staticmethod
@@ -62,7 +62,7 @@ class Frames:
         state = replace(moving.state, time=moving.time)
         history = self.history
         history.add(StepResult(state, iterations, residual), 0)
-        moved = moving.kept.displacement
+        moved = moving.retained.displacement
         history.rows["crest_ux"][-1] = float((quake.problem.crest @ moved)[0])
         history.save(state)
         history.saved.clear()  # the tables have all that is needed of it

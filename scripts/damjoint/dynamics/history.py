@@ -55,7 +55,7 @@ class Peak:
 
     value: float
     time: float
-    #: displacement of `Problem.kept` since the static state (k,)
+    #: displacement of `Problem.retained` since the static state (k,)
     displacement: Array
 
 
@@ -66,7 +66,7 @@ class QuakeHistory:
     #: columns of quake.csv
     rows: dict[str, list[float]]
     frames: Frames
-    #: see `System.resultants`, of each joint, from the acceleration of `Problem.kept`
+    #: see `System.resultants`, of each joint, from the acceleration of `Problem.retained`
     inertia: list[Array]
     #: the joints in the static state
     before: list[JointState]
@@ -83,13 +83,13 @@ class QuakeHistory:
         """No rows, and the frame of the static state; span: as in `Frames`."""
         equilibrium, graph = quake.problem.model.equilibrium, quake.case.graph
         joints, static = equilibrium.interface.joints, quake.problem.static
-        # what follows the kept unknowns has no mass
-        kept = np.append(quake.problem.kept, quake.system.size + np.arange(2))
+        # what follows the retained unknowns has no mass
+        retained = np.append(quake.problem.retained, quake.system.size + np.arange(2))
         return QuakeHistory(
             {name: [] for name in quake_columns(quake.case)},
             Frames.of(quake, span),
             [
-                quake.system.resultants(joint, graph.separated([k]))[:, kept]
+                quake.system.resultants(joint, graph.separated([k]))[:, retained]
                 for k, joint in enumerate(joints)
             ],
             [JointState(equilibrium, static, k) for k in range(len(joints))],
@@ -113,7 +113,7 @@ class QuakeHistory:
 
     def add(self, quake: Earthquake, step: Converged) -> None:
         """The row of a converged step."""
-        motion, state, crest = step.end.kept, step.end.state, quake.problem.crest
+        motion, state, crest = step.end.retained, step.end.state, quake.problem.crest
         row = {
             "time": step.end.time,
             "ground_ax": step.ground[0],

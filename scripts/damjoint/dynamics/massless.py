@@ -28,11 +28,11 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True, kw_only=True)
 class MasslessRock:
-    """The unknowns (m,) that follow others, `edge` (e,), and all others, `kept` (k,)."""
+    """The unknowns (m,) that follow others, `edge` (e,), and all others, `retained` (k,)."""
 
     inside: IntArray
-    kept: IntArray
-    #: numbers among `kept`
+    retained: IntArray
+    #: numbers among `retained`
     edge: IntArray
     #: T (m, e)
     follow: Array
@@ -51,30 +51,30 @@ class MasslessRock:
         share = abs(damped).sum() / abs(rows).sum()
         if abs(damped - share * rows).max() > ROUNDING * abs(damped).max():
             return None
-        kept = others(system.size, inside)
-        beside = rows[:, kept].tocsc()
+        retained = others(system.size, inside)
+        beside = rows[:, retained].tocsc()
         edge = np.flatnonzero(np.diff(beside.indptr))
         if len(inside) * len(edge) > MOST_ENTRIES:
             return None
         of_rock = CsrMatrix.of_scipy(rows[:, inside])
         follow = -solve_symmetric(of_rock, beside[:, edge].toarray())
         return MasslessRock(
-            inside=inside, kept=kept, edge=edge, follow=np.ascontiguousarray(follow)
+            inside=inside, retained=retained, edge=edge, follow=np.ascontiguousarray(follow)
         )
 
     def reduce(self, matrix: Sparse) -> Sparse:
-        """A symmetric matrix (n, n) in the unknowns `kept` (k, k)."""
+        """A symmetric matrix (n, n) in the unknowns `retained` (k, k)."""
         rows = matrix.tocsr()[self.inside]
-        across, follow = rows[:, self.kept[self.edge]].T @ self.follow, self.follow
+        across, follow = rows[:, self.retained[self.edge]].T @ self.follow, self.follow
         added = across + across.T + follow.T @ (rows[:, self.inside] @ follow)
-        size, number = len(self.kept), len(self.edge)
+        size, number = len(self.retained), len(self.edge)
         entries = np.repeat(self.edge, number), np.tile(self.edge, number)
         at_edge = sparse.csr_matrix((added.ravel(), entries), (size, size))
-        return (matrix.tocsr()[self.kept][:, self.kept] + at_edge).tocsr()
+        return (matrix.tocsr()[self.retained][:, self.retained] + at_edge).tocsr()
 
     def expand(self, displacement: Array) -> Array:
-        """All unknowns (n, ...), from those of `kept` (k, ...)."""
-        whole = np.empty((len(self.kept) + len(self.inside), *displacement.shape[1:]))
-        whole[self.kept] = displacement
+        """All unknowns (n, ...), from those of `retained` (k, ...)."""
+        whole = np.empty((len(self.retained) + len(self.inside), *displacement.shape[1:]))
+        whole[self.retained] = displacement
         whole[self.inside] = self.follow @ displacement[self.edge]
         return whole

@@ -40,8 +40,8 @@ class Moving:
 
     time: float
     state: State
-    #: of the unknowns of the steps, see `Problem.kept`
-    kept: Motion
+    #: of the unknowns of the steps, see `Problem.retained`
+    retained: Motion
     #: g: change of the joints' nodal forces, dashpots and water included, since the static state
     forces: Array
     #: what follows them
@@ -50,10 +50,10 @@ class Moving:
     @property
     def motion(self) -> Motion:
         """Of all unknowns (n,)."""
-        kept = self.kept
+        retained = self.retained
         if not self.rock:
-            return kept
-        parts = kept.displacement, kept.velocity, kept.acceleration
+            return retained
+        parts = retained.displacement, retained.velocity, retained.acceleration
         return Motion(*map(self.rock.expand, parts))
 
 
@@ -74,18 +74,18 @@ class Problem:
     rock: MasslessRock | None = None
 
     @cached_property
-    def kept(self) -> IntArray:
+    def retained(self) -> IntArray:
         """The unknowns of the steps (k,), of all (n,): without the rock that follows them."""
-        return self.rock.kept if self.rock else np.arange(self.system.size)
+        return self.rock.retained if self.rock else np.arange(self.system.size)
 
     @cached_property
     def crest(self) -> Sparse:
         """Displacement of the crest along x and y (2, k)."""
-        return self.system.crest[:, self.kept]
+        return self.system.crest[:, self.retained]
 
-    def whole(self, kept: Array) -> Array:
-        """The displacement of all unknowns (n, ...) from that of `kept` (k, ...)."""
-        return self.rock.expand(kept) if self.rock else kept
+    def whole(self, retained: Array) -> Array:
+        """The displacement of all unknowns (n, ...) from that of `retained` (k, ...)."""
+        return self.rock.expand(retained) if self.rock else retained
 
     @property
     def at_rest(self) -> Moving:
@@ -93,7 +93,7 @@ class Problem:
         return Moving(
             time=0.0,
             state=self.static,
-            kept=Motion.at_rest(len(self.kept)),
+            retained=Motion.at_rest(len(self.retained)),
             forces=np.zeros(len(self.system.jumps)),
             rock=self.rock,
         )
@@ -112,7 +112,7 @@ class TimeStep:
         matrices, rock = (system.mass, system.stiffness, problem.damping), problem.rock
         #: mass, stiffness and damping of the unknowns of the steps (k, k), and the jumps among them
         self.mass, self.of_bodies, self.damping = map(rock.reduce, matrices) if rock else matrices
-        self.jumps = np.searchsorted(problem.kept, system.jumps)
+        self.jumps = np.searchsorted(problem.retained, system.jumps)
         matrix = acceleration * self.mass + weight * (self.of_bodies + self.rate * self.damping)
         self.factors = partial_factors(matrix.tocsr(), self.jumps)
         #: S (j, j)
@@ -154,7 +154,7 @@ class TimeStep:
         lifted = lift(equilibrium, pressure, water)
         joints = self.joint_problem(begin, start.variables, self.on_jumps(begin, loads, lifted))
         joints = replace(joints, water=water)
-        ahead = now.jump + self.dt * begin.kept.velocity[self.jumps]
+        ahead = now.jump + self.dt * begin.retained.velocity[self.jumps]
         both = ((jump, joints.residual(jump, loading)) for jump in (now.jump, ahead))
         guess, residual = min(both, key=lambda pair: float(np.linalg.norm(pair[1].value)))
         strategies = model.strategies
@@ -186,9 +186,9 @@ class TimeStep:
 
     def on_jumps(self, begin: Moving, loads: tuple[Array, Array], lifted: Array) -> Array:
         """The loads (j,) of a step, see `advance`; lifted: of the water in the joints."""
-        problem, motion, static = self.problem, begin.kept, self.problem.static
+        problem, motion, static = self.problem, begin.retained, self.problem.static
         alpha, weight = problem.scheme.shift, self.weight
-        load = (weight * loads[1] - alpha * loads[0])[problem.kept]
+        load = (weight * loads[1] - alpha * loads[0])[problem.retained]
         of_velocity, of_acceleration = problem.scheme.history(motion, self.dt)
         right = self.mass @ of_acceleration
         if self.damping.nnz:
@@ -219,7 +219,7 @@ class TimeStep:
     def dashpots(self, begin: Moving) -> Dashpots:
         """The dashpots of the points that are closed when a step begins."""
         interface = self.equilibrium.interface
-        of_velocity, _ = self.problem.scheme.history(begin.kept, self.dt)
+        of_velocity, _ = self.problem.scheme.history(begin.retained, self.dt)
         resting = self.problem.static.jump + of_velocity[self.jumps] / self.rate
         before, at_rest = (
             interface.jumps(interface.at_points, jump) for jump in (begin.state.jump, resting)
@@ -234,7 +234,7 @@ class TimeStep:
             begin,
             time=begin.time + self.dt,
             state=state,
-            kept=self.problem.scheme.step(begin.kept, displacement, self.dt),
+            retained=self.problem.scheme.step(begin.retained, displacement, self.dt),
             forces=self.equilibrium.interface.forces(traction) - lifted - self.at_static,
         )
 
