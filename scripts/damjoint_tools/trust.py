@@ -216,10 +216,11 @@ def quake_section(rows: list[Row]) -> str:
         "$E$ from 5e9 to 1e11 Pa, $K_N$ from "
         "1e9 to 1e13 Pa/m, all laws and uplifts, batter, sloping joint, one to three joints (most "
         "of the lift joints with a law and water of their own); added mass, water in the crack by "
-        "each rule, damping of 1 to 10 % with and without its part by the mass, dashpots in the "
-        "joint, rock with mass; `hht_alpha` of 0, -0.05, -0.2, and the published scheme. Records "
-        "of 0.8 to 1.6 s of three waves of 1 to 9 Hz, up to 1 g, most with a vertical component, "
-        "of both signs. One scene in eight each has an elastic joint (no earthquake breaks it), "
+        "each rule (in time in 2D), damping of 1 to 10 % with and without its part by the mass, "
+        "dashpots in the joint, rock with mass; `hht_alpha` of 0, -0.05, -0.2, and the published "
+        "scheme. Records of 0.8 to 1.6 s of three waves of 1 to 9 Hz, up to 1 g, most with a "
+        "vertical component, of both signs. One scene in eight each has an elastic joint (no "
+        "earthquake breaks it), "
         "or is a rigid block with dry friction on a rigid ground. Written by the same command.",
         source_line(rows),
         "### What is verified in each earthquake",
@@ -253,6 +254,7 @@ FEATURES = {
     "dashpots in the joint": "joint_damping_n=",
     "damping by the mass": "damping_mass=",
     "published scheme": "time_integration=published",
+    "flow in time": "quake_uplift=transient",
 }
 
 

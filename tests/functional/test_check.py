@@ -635,6 +635,17 @@ def test_long_names_of_combinations_are_wrapped_over_the_rows_of_each(solve):
     assert "FE" in rows[0] and "gravity" in rows[1] and "required" in rows[3]
 
 
+def test_the_table_of_a_run_that_ends_early_fits_the_terminal(solve):
+    """Methods with "partial load" are shortened, too; a name keeps a few characters."""
+    settings = {"lift_heights": (12.0,), "required_SSF": 1.2, "adhesion": 0.0}
+    (result,) = solve("dam", (60.0,), n_joint=10.0, order=1.0, law="friction", **settings)
+    checks = compare_joints(result)
+    for width in (20, 64):
+        table = text_table(checks, width).split("\n\n")[1]
+        assert "FE, partial load" in table and "lift 12" in table
+    assert max(map(len, table.splitlines())) <= 64
+
+
 def test_a_joint_that_others_hold_may_slip_along_its_full_length(tmp_path):
     """Its SSF is 1 less the hardening; the run stands, and so does the check."""
     blocks = {"one": (0.0, 0.0, 10.0, 20.0), "two": (10.0, 0.0, 22.0, 20.0)}

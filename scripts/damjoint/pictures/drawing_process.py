@@ -98,8 +98,8 @@ def serve(pipe: Connection, of_parent: Connection) -> None:
                     pipe.send(RunError(ENDED))
 
 
-#: The message if a process is killed.
-ENDED = "picture: the process that draws it has ended"
+#: The message if a process is killed; the results are saved before.
+ENDED = "picture: the process that draws it has ended; `damjoint plot` draws it again"
 
 
 def has_answered(process: BaseProcess) -> bool:

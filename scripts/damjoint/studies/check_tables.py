@@ -48,6 +48,8 @@ LESS = ("level", "c L", "c B", "eff. toe", "eff. heel", "M", "N' at x", "U", "cr
 
 #: Methods in a table that is too wide with their full names.
 SHORT = {FINITE_ELEMENTS: "FE", GRAVITY: "gravity", LONGER: "longer crack"}
+#: Characters of a column of names at least.
+NARROWEST = 8
 
 
 def text_table(checks: list[SafetyCheck], width: int | None = None) -> str:
@@ -69,7 +71,7 @@ def text_table(checks: list[SafetyCheck], width: int | None = None) -> str:
         columns += [list(map(cell, line * factor, is_difference)) for line in values]
     verdicts = ([row[name] for row in rows] for name in ("position", "verdict"))
     scenes = [scene_label(checks, row) for row in rows]
-    loads = (", partial load" * (row.get("load") == "partial") for row in rows)
+    loads = [", partial load" * (row.get("load") == "partial") for row in rows]
     methods = [row["answer"] + part for row, part in zip(rows, loads, strict=True)]
     first, common = "case", f"{checks[0].case.name}, " if checks else ""
     if all(scene.startswith(common) for scene in scenes):  # only joints or uplifts differ
@@ -85,7 +87,8 @@ def text_table(checks: list[SafetyCheck], width: int | None = None) -> str:
 
     table = drawn()
     if width is not None and (excess := max(map(len, table.splitlines())) - width) > 0:
-        columns[1] = [SHORT.get(method, method) for method in methods]
+        short = (SHORT.get(name := str(row["answer"]), name) for row in rows)
+        columns[1] = [answer + part for answer, part in zip(short, loads, strict=True)]
         excess -= max(map(len, methods)) - max(map(len, columns[1]))
         columns[0] = in_rows(columns[0], max(map(len, columns[0])) - max(excess, 0))
         table = drawn()
@@ -107,7 +110,7 @@ def in_rows(names: list[str], width: int) -> list[str]:
     cells = list[str]()
     for name, same in groupby(names):
         rows = len(list(same))
-        cells += [*wrap(name, max(width, 1), max_lines=rows), *[""] * rows][:rows]
+        cells += [*wrap(name, max(width, NARROWEST), max_lines=rows), *[""] * rows][:rows]
     return cells
 
 
