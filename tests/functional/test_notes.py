@@ -239,3 +239,12 @@ def test_the_water_of_an_earthquake_needs_uplift(command, mine, uplift, noted):
     note = "damjoint: mine: quake_uplift has no effect; it needs uplift"
     assert ([line for line in err.splitlines() if "quake_uplift" in line] == [note]) == noted
     assert "k_h" not in err
+
+
+def test_flow_in_time_that_begins_after_the_loading(command, mine, tmp_path):
+    """Is steady, as the note says, and has no picture of water in time."""
+    mine('default_uplift = "flow"; default_time_unit = 60; default_time_start = 5; levels() = {9};')
+    code, _, err = command("run", "mine.case", "--set", "visc=1", "--out", "out")
+    assert code == 0 and "time_start = 5: no water is stored, the loading ends at t = 1" in err
+    assert "visc = 1 Pa s is unusual (0.0001 to 0.1); is it in another unit?" in err
+    assert not list((tmp_path / "out").glob("*water*"))

@@ -34,6 +34,7 @@ USUAL = {
     **dict.fromkeys(("adhesion", "sigma_max"), (1e3, 1e7)),
     "f_c": (1e5, 2e8),
     "ice_force": (1e3, 1e6),
+    "visc": (1e-4, 0.1),
 }
 #: Values of larger magnitude are those of no material or load: with them rounding decides whether
 #: there is an equilibrium, which would be taken for a property of the dam. (A modulus up to the

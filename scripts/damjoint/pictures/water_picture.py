@@ -34,7 +34,7 @@ SIZE = 9.0, 7.0
 def has(results: Results) -> bool:
     """Whether there is flow in time to draw."""
     timed = any(joint["uplift"] == "flow" and joint["time_unit"] for joint in results.case.joints)
-    return bool(timed and results.joint["time"].any())
+    return bool(timed and (results.joint["time"] > results.case["time_start"]).any())
 
 
 def draw(results: Results, folder: Path) -> Path:

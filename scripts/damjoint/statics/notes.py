@@ -106,6 +106,11 @@ def loads_in_part(case: Case) -> Iterator[str]:
                 )
             if name not in WORKS:
                 break  # of all joints
+    if case.stores_water and case["time_start"] >= last:
+        yield (
+            f"time_start = {case['time_start']:g}: no water is stored, the loading ends at "
+            f"t = {last:g}"
+        )
     own_times = case.source and "times" in case.source.text.of_user
     for time, level in enumerate(case.levels, 1):
         if own_times and time not in case.times:
