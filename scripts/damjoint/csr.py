@@ -123,6 +123,16 @@ class CsrMatrix:
         products = self.data * other[self.indices]
         return np.asarray(np.bincount(self.rows, products, self.shape[0]), float)
 
+    def on_rows(self, other: Array) -> Array:
+        """The products (..., m) with an array (n,), or with each row of one (k, n); no scipy."""
+        if other.ndim == 1:
+            return self @ other
+        result = np.zeros((self.shape[0], len(other)))
+        if len(full := np.flatnonzero(self.counts)):
+            products = self.data[:, None] * other.T[self.indices]
+            result[full] = np.add.reduceat(products, self.indptr[full])
+        return result.T
+
     def _times(self, other: CsrMatrix) -> CsrMatrix:
         """The product with a matrix."""
         if max(len(self.data), len(other.data)) > LARGE:

@@ -119,6 +119,30 @@ def test_the_results_of_a_run_against_central_differences(law, uplift):
             assert got == pytest.approx(expected, rel=EXACT, abs=allowed), (row.name, column)
 
 
+def test_fifty_parameters_of_a_dam_with_lifts():
+    """All forces are proportional to moduli, stiffnesses, strengths, energies and densities
+    together, and displacements do not change with them [Euler's theorem].
+    """
+    law = {"K_N": 1e11, "K_T": 5e10, "adhesion": 4e5, "sigma_max": 1e5, "G_f": 90.0}
+    law |= {"G_t": 900.0, "mu": 0.9}
+    varied = {n: tuple(v * (1 + k / 10) for k in range(4)) for n, v in law.items()}
+    coarse = {"lift_heights": (12.0, 24.0, 36.0), "n_joint": 6, "order": 1, "uplift": "cracked"}
+    loads = {"silt_height": 6.0, "ice_force": 1e5, "anchor_force": 2e5, "temperature_dam": -4.0}
+    case = dj.case("dam", levels=[30, 44], law="bond", E_dam=2.1e10, **coarse, **varied, **loads)
+    names = sensitivity.all_of(case)
+    rows = [row for row in sensitivity.of_run(case, names) if row.level == 44]
+    assert len(rows) == len(names) >= 50
+    forces = {"E_dam", "E_found", "rho_dam", "rho_found", "rho_water", "rho_silt"}
+    forces |= {"ice_force", "anchor_force", *law} - {"mu"}
+    last = history(case)
+    assert last["max_opening"] > 1e-5
+    for column in ("crest_ux", "max_opening", "N", "T", "N_2", "M_4", "crack_end"):
+        of = [r for r in rows if r.name.rpartition(".")[2] in forces]
+        total = sum(row.value * row.derivatives[column] for row in of)
+        expected = last[column] if column[0] in "NTM" else 0.0
+        assert total == pytest.approx(expected, rel=1e-6, abs=1e-6 * abs(last[column])), column
+
+
 def test_a_load_that_is_zero_has_a_derivative_on_its_side():
     """The vertical acceleration takes weight off, the line force of ice is not negative."""
     case = dj.case("dam", levels=[20], n_joint=10)

@@ -231,6 +231,21 @@ class Case(ParameterValues):
         )
         return replace(self, values={**self.values, **values}, of_joints=others)
 
+    def with_value(self, name: str, value: Value) -> Case:
+        """The case with another value of a parameter, or of that of one joint, "lift 25 m.mu";
+        without the checks of `changed`.
+        """
+        joint, _, of_joint = name.rpartition(".")
+        if not joint or not self.of_joints:
+            return self.with_values({of_joint: value})
+        old, names = {of_joint: self.values[of_joint]}, self.joint_names
+        others = tuple(
+            replace(one, values=old | one.values | ({of_joint: value} if one.name == joint else {}))
+            for one in self.of_joints
+        )
+        first = {of_joint: value} if joint == names[0] else {}
+        return replace(self, values=self.values | first, of_joints=others)
+
     def with_joints(self, joints: Sequence[OfJoint]) -> Case:
         """The case of a user's own geometry, with the names and ends of its joints.
 

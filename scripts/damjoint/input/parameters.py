@@ -302,11 +302,37 @@ def independent() -> frozenset[str]:
     """Names of the numbers on which neither another parameter nor the section depends: those that
     occur only in their own declaration.
     """
+    used = set(re.findall(r"\w+", computations()))
+    return frozenset(n for n, p in declared().items() if n not in used and not p.text)
+
+
+@lru_cache(maxsize=1)
+def computations() -> str:
+    """What the declarations and the section compute, without the declarations themselves."""
     others = ("section.pro", "automatic_of_joint.pro")
     texts = (DECLARATIONS, *(DECLARATIONS.with_name(name) for name in others))
-    rest = "".join(re.sub(DECLARED, "", re.sub(r"//[^\n]*", "", t.read_text())) for t in texts)
-    used = set(re.findall(r"\w+", rest))
-    return frozenset(n for n, p in declared().items() if n not in used and not p.text)
+    return "".join(re.sub(DECLARED, "", re.sub(r"//[^\n]*", "", t.read_text())) for t in texts)
+
+
+#: A statement that computes a value: its name, and from what.
+STATEMENT = r"(\w+)(?:\([^()=]*\))?\s*\+?=(?!=)([^;]*);"
+
+
+@lru_cache(maxsize=200)
+def followers(name: str) -> frozenset[str]:
+    """Names of what is computed from a value, directly or through others."""
+    reached, new = {name}, {name}
+    while new:
+        new = {to for to, of in statements() if of & new} - reached
+        reached |= new
+    return frozenset(reached - {name})
+
+
+@lru_cache(maxsize=1)
+def statements() -> list[tuple[str, set[str]]]:
+    """What the statements of `computations` compute, and the words in their formulas."""
+    found = re.findall(STATEMENT, computations())
+    return [(name, set(re.findall(r"\w+", formula))) for name, formula in found]
 
 
 def condition_text(condition: str) -> str:

@@ -4,6 +4,7 @@ water, and the problem of a step made from them.
 
 from __future__ import annotations
 
+from copy import copy
 from functools import lru_cache
 
 import numpy as np
@@ -57,20 +58,39 @@ class Equilibrium:
         #: tangent (q, 3, 3) of the undamaged joints
         points = [len(joint.points.weights) for joint in interface.joints]
         self.undamaged = self.laws.undamaged_tangent(points)
-        #: forces on the functions of a face under the tailwater, by its name and level: of the last
-        self.tail_forces = lru_cache(maxsize=4)(
-            lambda name, tail: self.face_forces(interface.faces[name], Loading(0.0, tail))
-        )
-        #: unit loads by the parts of the loads that act
-        self.sizes = lru_cache(maxsize=4)(lambda grown: self.unit_loads(Loading(0.0, 0.0, grown)))
         #: loaded unknowns on which a face acts, and the functions of the face that are among them
         self.loaded = {
             name: (dofs[dofs >= 0], np.flatnonzero(dofs >= 0))
             for name, dofs in interface.bulk.dof_of_face.items()
         }
+        self.keep_loads()
+
+    def keep_loads(self) -> None:
+        """Keep the last loads."""
+        #: forces on the functions of a face under the tailwater, by its name and level: of the last
+        self.tail_forces = lru_cache(maxsize=4)(
+            lambda name, tail: self.face_forces(self.interface.faces[name], Loading(0.0, tail))
+        )
+        #: unit loads by the parts of the loads that act
+        self.sizes = lru_cache(maxsize=4)(lambda grown: self.unit_loads(Loading(0.0, 0.0, grown)))
         #: forces on the loaded unknowns and t_0; with the water in the joints: of the last loadings
         self.external_forces = lru_cache(maxsize=8)(self._external_forces)
         self.loads = lru_cache(maxsize=8)(self._loads)
+
+    def with_laws(self, case: Case) -> Equilibrium:
+        """The same for another case that differs in parameters of the laws."""
+        other = copy(self)
+        other.case = case
+        pairs = zip(case.joints, self.case.joints, self.laws.laws, strict=True)
+        other.laws = JointLaws([law if a.values == b.values else a.law for a, b, law in pairs])
+        return other
+
+    def with_loads(self, case: Case) -> Equilibrium:
+        """The same for another case that differs in loads other than water in the joints."""
+        other = copy(self)
+        other.case = case
+        other.keep_loads()
+        return other
 
     # -- loads
     # ---------------------------------------------------------------------------------------------

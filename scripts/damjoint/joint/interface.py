@@ -239,9 +239,9 @@ class Interface:
         return jumps_from(matrix, unknowns, self.dim)
 
     def forces(self, traction: Array) -> Array:
-        """Nodal forces (j,) of a traction (q, 3) at the Gauss points."""
-        weighted = self.weights[:, None] * traction[:, : self.dim]
-        return self.from_points @ weighted.ravel()
+        """Nodal forces (..., j) of a traction (..., q, 3) at the Gauss points."""
+        weighted = self.weights[:, None] * traction[..., : self.dim]
+        return self.from_points.on_rows(weighted.reshape(*traction.shape[:-2], -1))
 
     def network_flow(self, network: Network, waterstops: tuple[float | None, ...]) -> Flow:
         """Operators of water that flows in joints that meet; kept. waterstops: distance from the

@@ -44,6 +44,11 @@ class Tangent:
     flow: FlowDerivative | None = None
     flowing: tuple[Flow, ...] = ()
 
+    @property
+    def lift(self) -> CsrMatrix:
+        """Nodal forces of the pressures of the flowing water (j, p)."""
+        return stacked([part.lift.T for part in self.flowing]).T
+
 
 @dataclass(frozen=True)
 class Border:
@@ -89,8 +94,7 @@ class DenseSystem:
         """S + K (j, j)."""
         matrix = self.stiffness + self.assembly.dense(tangent.law)
         if flow := tangent.flow:
-            lift = stacked([part.lift.T for part in tangent.flowing]).T
-            matrix[:, flow.columns] -= lift @ flow.pressure
+            matrix[:, flow.columns] -= tangent.lift @ flow.pressure
         return matrix
 
 

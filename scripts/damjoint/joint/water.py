@@ -178,9 +178,8 @@ class JointWater:
         return self.force(self.uplift(loading, self.wetted.fields, y, beyond, lowest))
 
     def force(self, pressure: Array) -> Array:
-        """Forces on the two faces (j,) of pressures at the points of `wetted` [Pa]."""
-        forces: Array = self.wetted.opening.T @ (self.wetted.points.weights * pressure)
-        return forces
+        """Forces on the two faces (..., j) of pressures (..., q) at the points of `wetted` [Pa]."""
+        return self.wetted.opening.T.on_rows(self.wetted.points.weights * pressure)
 
     @property
     def narrowest(self) -> float:
@@ -299,13 +298,16 @@ class JointWater:
         loading: Loading,
         before_quake: BeforeQuake | None = None,
         step: TimeStep | None = None,
+        beyond: Array | None = None,
     ) -> Pressure:
         """The water pressure in the joint at a jump, for the internal variables of all joints;
-        before_quake: see `StepWater`; step: see `WaterSystem.solve`.
+        before_quake: see `StepWater`; step: see `WaterSystem.solve`; beyond: the pressure of the
+        flow beyond the imposed one at the nodes, where it is known.
         """
         joint, fields = self.joint, self.joint.fields
-        beyond = np.zeros(fields.nodes)
-        if self.flowing:
+        if not self.flowing:
+            beyond = np.zeros(fields.nodes)
+        elif beyond is None or self.system.network:
             solution = self.system.solve(jump, variables, loading, before_quake, step)
             beyond = self.system.expand_to_nodes(solution)[self.nodes]
 

@@ -43,11 +43,11 @@ class Chord:
 
     def resultants(
         self, weights: Array, positions: Array, traction: Array
-    ) -> tuple[float, float, float]:
-        """N (compression > 0), T (downstream > 0) and M (about the toe, holding down > 0) of a
-        traction (q, 3) along x, y, z at positions (q, 3).
+    ) -> tuple[Array, Array, Array]:
+        """N (compression > 0), T (downstream > 0) and M (about the toe, holding down > 0), (...,),
+        of tractions (..., q, 3) along x, y, z at positions (q, 3).
         """
         force = weights[:, None] * (traction @ self.plane.T)
-        total, arm = force.sum(axis=0), positions @ self.plane.T - self.toe
-        moment = np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0])
-        return -total @ self.normal, total @ self.along, float(moment)
+        total, arm = force.sum(axis=-2), positions @ self.plane.T - self.toe
+        moment = np.sum(arm[:, 0] * force[..., 1] - arm[:, 1] * force[..., 0], axis=-1)
+        return -total @ self.normal, total @ self.along, moment

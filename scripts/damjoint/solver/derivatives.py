@@ -15,26 +15,37 @@ as at open points, a second correction follows; its size shows a kink.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from .. import InputError, RunError
-from ..arrays import Array
+from ..arrays import Array, BoolArray, IntArray
 from ..csr import CsrMatrix
 from ..fem.cache import key_of
-from ..input.case import Case
-from ..input.parameters import independent, parameter
+from ..fem.condensed import Condensed
+from ..fem.moduli import Moduli
+from ..input.case import SECTION, Case
+from ..input.parameters import AUTOMATIC, declared, followers, parameter
 from ..input.resolve import varied
+from ..input.values import flows, flows_in_time, freezes_uplift
 from ..joint.equilibrium import Equilibrium
-from ..joint.linear_system import Border, DenseSystem, Tangent
-from ..joint.problem import JointProblem
-from ..model.loads import LEVEL, Loading, Unknown
+from ..joint.flow import FlowDerivative
+from ..joint.interface import JointInterface
+from ..joint.linear_system import Border, Tangent
+from ..joint.problem import JointProblem, rate
+from ..joint.water import Pressure
+from ..laws import Law
+from ..model.loads import LEVEL, Loading
 from ..model.results import column_of, history_table
+from ..threads import scipy_linalg
 from .controls import DisplacementControl, Prescribed
-from .history import History
+from .history import History, JointState
 from .model import Begun, Model, StepResult
 from .state import State, Trace
 
@@ -47,7 +58,20 @@ ZERO = {"Pa": 1.0, "Pa per m": 1e5, "N per m": 1e-1, "kg per m3": 1e-2}
 #: joint is at a kink: about to open, to slip or to break [-].
 CORRECTIONS, KINK = 6, 1e-5
 #: Correction over the derivative up to which there is no further one [-].
-EXACT = 1e-9
+EXACT = 1e-7
+#: Correction times the distance of the sides, over the jumps, up to which it is round-off [-].
+ROUNDING = 1e-13
+
+#: Parameters of the laws that are not of the group Joint, and of the loads not of the group Loads.
+OF_LAW = "grout_pressure", "grout_t", "saw_thickness", "saw_t"
+OF_LOADS = "rho_dam", "rho_found"
+#: Moduli of the bodies; and of the parameters that are not loads those by which the body above a
+#: joint is loaded.
+MODULI = "E", "E_dam", "E_found"
+LOADING = "rho_dam", "rho_water", "g"
+
+#: Number of unknowns up to which numpy inverts, as scipy would take longer to load.
+FEW = 1500
 
 #: Groups of parameters on which the mesh or the way to the solution depends.
 NOT_CONTINUOUS = "Mesh", "Solver", "Geometry"
@@ -64,27 +88,14 @@ class Side:
 
 
 @dataclass(frozen=True)
-class Derivative:
-    """Of a state with a parameter: states on both sides, their distance, whether at a kink."""
+class Rates:
+    """Derivatives of a state with parameters (parameters,): of the level, where a displacement is
+    prescribed [m over the unit], of values by their names; whether at a kink.
+    """
 
-    low: Side
-    high: Side
-    distance: float
-    kink: bool
-
-    def of(self, low: float, high: float) -> float:
-        """Of a quantity, by its values on both sides."""
-        return (high - low) / self.distance
-
-    @property
-    def level(self) -> float:
-        """Of the level, where a displacement is prescribed [m over the unit]."""
-        return self.of(self.low.state.loading.level, self.high.state.loading.level)
-
-    def row(self, values: Callable[[Side], dict[str, float]]) -> dict[str, float]:
-        """Of values by name, such as `history_row`."""
-        low, high = (values(side) for side in (self.low, self.high))
-        return {name: self.of(low[name], high[name]) for name in low}
+    level: Array
+    values: Mapping[str, Array]
+    kink: BoolArray
 
 
 def history_row(side: Side) -> dict[str, float]:
@@ -96,31 +107,33 @@ def history_row(side: Side) -> dict[str, float]:
     case = side.model.case
     row = {name: float(c[-1]) for name, c in history_table(case, rows).items()}
     for k in range(len(case.joints)):
-        row[column_of("crack_end", k)] = crack_end(equilibrium, side.state, k)
+        of = JointState(equilibrium, side.state, k)
+        beyond = of.jump[:, 0] - of.law.opening_of_crack(of.variables, len(of.jump))
+        row[column_of("crack_end", k)] = float(crack_ends(of.joint, beyond[None])[0])
     return row
 
 
-def crack_end(equilibrium: Equilibrium, state: State, number: int) -> float:
-    """Where the crack from the heel of a joint, by its number, ends [m]: there the opening, linear
-    between the Gauss points, is that from which on the law counts a point as crack; 0 without one.
-    It follows the state continuously, the length of crack in history.csv counts points.
+def crack_ends(joint: JointInterface, beyond: Array) -> Array:
+    """Where the crack from the heel of a joint ends [m] (n,): there the opening, linear between the
+    Gauss points, is that from which on the law counts a point as crack; 0 without one. It follows
+    the state continuously, the length of crack in history.csv counts points.
+
+    beyond: the openings less that (n, q).
     """
-    joint, law = equilibrium.interface.joints[number], equilibrium.laws.laws[number]
     if joint.dim == 3:
-        return math.nan
+        return np.full(len(beyond), math.nan)
     along = joint.chord.along[:2]
     heel = (joint.space.locations[:, :2] @ along).min()
-    variables = state.variables.joints[number]
-    jump = joint.jumps(joint.at_points, state.jump)
     place = joint.points.positions[:, :2] @ along - heel
     order = np.argsort(place)
-    beyond = (jump[:, 0] - law.opening_of_crack(variables, len(jump)))[order]
-    closed = np.flatnonzero(beyond <= 0)
-    if not len(closed) or closed[0] == 0:
-        return joint.length if not len(closed) else 0.0
-    k = closed[0]
-    part = beyond[k - 1] / (beyond[k - 1] - beyond[k])
-    return float(place[order][k - 1] + part * (place[order][k] - place[order][k - 1]))
+    place, beyond, rows = place[order], beyond[:, order], np.arange(len(beyond))
+    closed = beyond <= 0
+    first = closed.argmax(axis=1)
+    last = np.maximum(first - 1, 0)
+    step = beyond[rows, last] - beyond[rows, first]
+    part = np.divide(beyond[rows, last], step, out=np.zeros(len(rows)), where=first > 0)
+    ends = place[last] + part * (place[first] - place[last])
+    return np.where(closed.any(axis=1), np.where(first > 0, ends, 0.0), joint.length)
 
 
 def half_difference(case: Case, name: str) -> tuple[float, float, float]:
@@ -165,15 +178,24 @@ class Linearised:
     border: Border | None
 
     @cached_property
-    def matrix(self) -> Array:
-        """The dense matrix with its border."""
+    def solver(self) -> Callable[[Array], Array]:
+        """That of the dense system with its border, for several right sides of each parameter.
+
+        Raises LinAlgError if the system is singular.
+        """
         assert not isinstance(self.problem.stiffness, CsrMatrix)
-        system = DenseSystem(self.problem.interface.assembly, self.problem.stiffness)
-        matrix = system.matrix(self.tangent)
+        matrix, tangent = self.problem.stiffness.copy(), self.tangent
+        self.problem.interface.assembly.whole(tangent.law).add_to(matrix)
+        if tangent.flow:
+            matrix[:, tangent.flow.columns] -= tangent.lift @ tangent.flow.pressure
         if border := self.border:
             corner = np.array([[border.rate]])
             matrix = np.block([[matrix, border.slope[:, None]], [border.row[None], corner]])
-        return matrix
+        if len(matrix) <= FEW:
+            inverse = np.linalg.inv(matrix)
+            return lambda rights: np.asarray(inverse @ rights)
+        factors = scipy_linalg().lu_factor(matrix)
+        return lambda rights: np.asarray(scipy_linalg().lu_solve(factors, rights))
 
     def solve(self, rights: Array, gaps: Array) -> tuple[Array, Array]:
         """The solutions (j, k) for right sides (j, k), and the rates (k,) of the level for gaps
@@ -187,127 +209,256 @@ class Linearised:
             columns = [system.solve(self.tangent, right, border) for right, border in pairs]
             return np.array([x for x, _ in columns]).T, np.array([s for _, s in columns])
         whole = np.vstack([rights, gaps]) if self.border else rights
-        solution = np.asarray(np.linalg.solve(self.matrix, whole), float)
+        solution = self.solver(whole)
         return (solution[:-1], solution[-1]) if self.border else (solution, np.zeros(len(gaps)))
 
 
+def is_automatic(case: Case, name: str) -> bool:
+    """Whether the value of a parameter of a case follows from others."""
+    of_source = (case.source.text.defaults, case.source.overrides) if case.source else ()
+    given = any(of.get(name, AUTOMATIC) != AUTOMATIC for of in of_source)
+    return declared()[name].automatic and not given
+
+
+def water_differs(case: Case, other: Case) -> bool:
+    """Whether the water in a joint differs between cases that differ in a parameter of its law: in
+    a crack, from another opening on.
+    """
+    if case["uplift"] != "cracked":
+        return False
+    opening, other_opening = (c.law.opening_of_crack(c.law.initial(1), 1) for c in (case, other))
+    return bool(opening[0] != other_opening[0])
+
+
+def follows_none(case: Case, name: str) -> bool:
+    """Whether no other value of a case, and no part of its section, follows from a parameter, as
+    the place of a line force does from its size.
+    """
+    for other in followers(name):
+        if other in SECTION or (other == "line_size" and not case[name]):
+            return False
+        known = declared().get(other)
+        acts = known and any(known.matters_in(joint.values) for joint in case.joints)
+        if acts and is_automatic(case, other):
+            return False
+    return True
+
+
+def linear_flow(case: Case) -> bool:
+    """Whether the derivatives of the water that flows in a joint follow from those of the jumps: in
+    steady laminar flow.
+    """
+    return not (case["turbulent"] or flows_in_time(case))
+
+
 @dataclass
-class Parameter:
-    """A parameter with the models on both sides of its value, and their states along a path."""
+class Alike:
+    """Sides (n,) on which a joint has the same law: its internal variables at the Gauss points and
+    at the nodes of the sides, one side after the other, and those of the beginning of a step.
+    """
 
-    distance: float
-    models: tuple[Model, Model]
-    sides: tuple[Side, Side]
-    kink: bool = False
-    #: of the step under way: its beginnings on both sides, their problems, rates of jump and level
-    begun: Sequence[Begun] = ()
-    problems: Sequence[JointProblem] = ()
-    rate: Array = field(default_factory=lambda: np.zeros(0))
-    level_rate: float = 0.0
-    #: of its loads what the level rate is of
-    unknown: Unknown = LEVEL
+    law: Law[Any]
+    sides: IntArray
+    points: Any
+    nodes: Any
+    begun: tuple[Any, Any] = (None, None)
 
-    def begin(self, time: float, size: int, unknown: Unknown) -> None:
-        """Begin a step to a time; size: of the jumps; unknown: beside them."""
-        self.unknown = unknown
-        self.begun = [side.model.begin(side.state, time) for side in self.sides]
-        self.problems = [step.problem for step in self.begun]
-        self.rate, self.level_rate = np.zeros(size), 0.0
+    def begin(self, begin: float, end: float) -> None:
+        """Begin a step."""
+        both = self.points, self.nodes
+        self.begun = tuple(self.law.begin_step(v, begin, end) for v in both)
 
-    def ends(self, end: State) -> list[tuple[Begun, JointProblem, Array, Loading]]:
-        """On each side beginning, problem, jump and loading at the end of the step, to first order;
-        end: of the step between them.
-        """
-        result = []
-        for sign, step, problem in zip((-1, 1), self.begun, self.problems, strict=True):
-            half = sign * self.distance / 2
-            loading = step.model.loading(end.time, end.loading.level)
-            value = self.unknown.of(end.loading) + half * self.level_rate
-            loading = self.unknown.at(loading, value)
-            result.append((step, problem, end.jump + half * self.rate, loading))
-        return result
+    def traction(self, jumps: Array, variables: Any) -> Array:
+        """Tractions (n, q, 3) at jumps (n, q, 3) of the Gauss points."""
+        flat = self.law.traction_and_tangent(jumps.reshape(-1, 3), variables)[0]
+        return flat.reshape(jumps.shape)
 
-    def right(self, end: State) -> Array:
-        """The right side (j,) that remains."""
-        low, high = (p.residual(jump, loading).value for _, p, jump, loading in self.ends(end))
-        return (low - high) / self.distance
+    def finish(self, at_points: Array, at_nodes: Array) -> None:
+        """End the step at jumps (n, q, 3)."""
+        update = self.law.update_internal_variables
+        self.points = update(at_points.reshape(-1, 3), self.begun[0])
+        self.nodes = update(at_nodes.reshape(-1, 3), self.begun[1])
 
-    def gap(self, end: State, control: DisplacementControl | None) -> float:
-        """That of the prescribed displacement; 0 without."""
-        if control is None:
-            return 0.0
-        low, high = (
-            control.measure(step.model.equilibrium, jump, loading)
-            for step, _, jump, loading in self.ends(end)
-        )
-        return (low - high) / self.distance
+    def of(self, side: int) -> tuple[Any, Any]:
+        """The internal variables of a side: of Gauss points and nodes."""
+        number, k = len(self.sides), int(np.searchsorted(self.sides, side))
+        return part_of(self.points, k, number), part_of(self.nodes, k, number)
 
-    def add(self, change: Array, level_change: float, correction: bool) -> bool:
-        """Add to the rates; whether they need a further correction. correction: whether these are
-        changes of a derivative, which are large at a kink.
-        """
-        self.rate, self.level_rate = self.rate + change, self.level_rate + level_change
-        error, size = float(np.linalg.norm(change)), float(np.linalg.norm(self.rate))
-        self.kink |= correction and error > KINK * size > 0
-        return not correction or error > EXACT * size
 
-    def end(self, end: State, at_rest: bool) -> Derivative:
-        """The derivative at the end of the step, where the next one begins; at_rest: whether
-        displacements count from there.
-        """
-        low, high = (
-            replace(side, state=step.end(jump, loading).after(side.state))
-            for side, (step, _, jump, loading) in zip(self.sides, self.ends(end), strict=True)
-        )
-        if at_rest:
-            low, high = (replace(side, at_rest=side.state) for side in (low, high))
-        self.sides = low, high
-        return Derivative(low, high, self.distance, self.kink)
+def part_of(variables: Any, k: int, number: int) -> Any:
+    """The k-th of a number of equal parts of the arrays of internal variables."""
+    if variables is None:
+        return None
+    values = {f.name: getattr(variables, f.name) for f in fields(variables)}
+    arrays = {n: v for n, v in values.items() if isinstance(v, np.ndarray) and v.ndim}
+    cut = {n: v[k * (len(v) // number) : (k + 1) * (len(v) // number)] for n, v in arrays.items()}
+    return replace(variables, **cut)
 
 
 class Differentiation:
-    """The derivatives of the states of a case along the updates that have led to one of them."""
+    """The derivatives of the states of a case along the updates that have led to one of them.
+
+    Each parameter has two sides, models with the parameter below and above its value. What the
+    parameter does not change is shared with the model of the case, and evaluated for all sides at
+    once: the laws joint by joint, the bodies, the loads, the water that flows.
+    """
 
     def __init__(self, model: Model, names: Sequence[str]) -> None:
         """names: of parameters, or of one of a joint, "lift 25 m.mu". Raises InputError."""
-        self.model = model
-        self.parameters = dict[str, Parameter]()
-        self.key = key_of(model.case)
-        for name in names:
-            _, low, high = half_difference(model.case, name)
-            models = self.model_with(name, low), self.model_with(name, high)
-            sides = Side(models[0], models[0].start()), Side(models[1], models[1].start())
-            self.parameters[name] = Parameter(high - low, models, sides)
+        self.model, self.names, self.key = model, list(names), key_of(model.case)
+        #: whether the equation of each side is evaluated apart, as its water follows from states
+        #: before, or not linearly from the jumps
+        self.apart = any(
+            freezes_uplift(joint) or (flows(joint) and not linear_flow(joint))
+            for joint in model.case.joints
+        )
+        #: whether the parameters are those of loads
+        self.loading = [
+            n in LOADING or parameter(n).group == "Loads"
+            for n in (m.rpartition(".")[2] for m in names)
+        ]
+        #: on each side, the low ones before the high ones: model, and the parameter beyond its
+        #: value; of each parameter the distance of its sides
+        self.models, half = list[Model](), list[float]()
+        ends = [half_difference(model.case, name) for name in names]
+        self.alone = self.without_followers(
+            {n: low for n, (_, low, _) in zip(names, ends, strict=True)}
+        )
+        for side in (1, 2):
+            for name, end in zip(names, ends, strict=True):
+                self.models.append(self.model_with(name, end[side]))
+                half.append((2 * side - 3) * (end[2] - end[1]) / 2)
+        self.half = np.array(half)
+        self.number, self.distance = len(ends), np.array([high - low for _, low, high in ends])
+        start = model.start()
+        #: of the sides, if each is evaluated apart; displacement of the crest from which it counts
+        self.states = [start] * (2 * self.number)
+        self.crest_at_rest = np.zeros(2 * self.number)
+        self.kink = np.zeros(self.number, bool)
+        self.joints = [self.alike_at(k) for k in range(len(model.equilibrium.laws.laws))]
+
+    @property
+    def alike(self) -> list[Alike]:
+        """The sides alike, of all joints."""
+        return [one for joint in self.joints for one in joint]
+
+    def of_joints(self, starts: Sequence[int]) -> list[tuple[slice, list[Alike]]]:
+        """The points of each joint, that start there, and its sides alike."""
+        return [(slice(*ends), j) for ends, j in zip(pairwise(starts), self.joints, strict=True)]
+
+    def alike_at(self, joint: int) -> list[Alike]:
+        """The sides with the same law of a joint, by its number."""
+        sides = dict[int, list[int]]()
+        laws = [model.equilibrium.laws.laws[joint] for model in self.models]
+        for number, law in enumerate(laws):
+            sides.setdefault(id(law), []).append(number)
+        of = self.model.equilibrium.interface.joints[joint]
+        q, rows = len(of.points.weights), len(of.rows)
+        return [
+            Alike(
+                law := laws[s[0]], np.array(s), law.initial(q * len(s)), law.initial(rows * len(s))
+            )
+            for s in sides.values()
+        ]
 
     def model_with(self, name: str, value: float) -> Model:
-        """The model with a value: on the same bodies, unless they depend on the parameter."""
-        case = self.model.case
-        if name in independent():
-            other = case.changed({name: value})
+        """The model with a value: what does not depend on the parameter is that of the model."""
+        model, of_joint = self.model, name.rpartition(".")[2]
+        case, known = model.case, parameter(of_joint)
+        if of_joint in MODULI and self.moduli and self.moduli.known:
+            return self.with_modulus(self.moduli, name, value)
+        if name in self.alone:
+            other = case.with_value(name, value)
         else:
             other = varied(case, {name: value})
             other = replace(other, levels=case.levels, tail_levels=case.tail_levels)
             other = replace(other, times=case.times)
-        same = key_of(other) == self.key
-        return Model(other, self.model.equilibrium.interface if same else None)
+        if key_of(other) != self.key:
+            whole = Model(other)
+            whole.equilibrium.laws = model.equilibrium.laws
+            return whole
+        of_law = known.group == "Joint" or of_joint in OF_LAW
+        with_laws = model.equilibrium.with_laws(other)
+        if of_law and not (self.apart or any(map(water_differs, case.joints, other.joints))):
+            return model.sharing(other, with_laws)
+        if of_joint in OF_LOADS or (known.group == "Loads" and not of_law):
+            return model.sharing(other, model.equilibrium.with_loads(other))
+        equilibrium = Equilibrium(other, model.equilibrium.interface)
+        equilibrium.laws = with_laws.laws if of_law else model.equilibrium.laws
+        return model.sharing(other, equilibrium)
 
-    def along(self, updates: Sequence[Trace]) -> tuple[list[dict[str, Derivative]], float]:
-        """The derivatives of each state of a path, by parameter, and its `level_rise` at the end.
-
-        Raises RunError if one of them was reached by relaxation with frozen damage.
+    def without_followers(self, values: Mapping[str, float]) -> set[str]:
+        """Those of parameters from which no other value of the case follows. Where a formula has
+        some of them, such as that of an automatic G_f, which is a constant with most laws, the case
+        is resolved once with other values of these.
         """
-        state, results = self.model.start(), list[dict[str, Derivative]]()
-        for update in updates:
+        case = self.model.case
+        alone = {name for name in values if follows_none(case, name.rpartition(".")[2])}
+        doubtful = {n: v for n, v in values.items() if n not in alone and n not in MODULI}
+        if not doubtful:
+            return alone
+        expected, resolved = case, varied(case, doubtful)
+        for name, value in doubtful.items():
+            expected = expected.with_value(name, value)
+        same = all(
+            a.section == b.section
+            and all(a[n] == b[n] or not p.matters_in(a.values) for n, p in declared().items())
+            for a, b in zip(expected.joints, resolved.joints, strict=True)
+        )
+        return alone | doubtful.keys() if same else alone
+
+    def with_modulus(self, moduli: Moduli, name: str, value: float) -> Model:
+        """The model with another E, E_dam or E_found, to first order around that of the case."""
+        model, case = self.model, self.model.case
+        changes = {name: value}
+        if name == "E":
+            changes |= {n: value for n in ("E_dam", "E_found") if is_automatic(case, n)}
+        dam, found = (changes.get(n, case[n]) / case[n] - 1 for n in ("E_dam", "E_found"))
+        other = model.equilibrium.with_loads(case.with_values(changes))
+        other.bulk = moduli.changed(dam, found)
+        other.interface = copy(other.interface)
+        other.interface.bulk = other.bulk
+        return model.sharing(other.case, other)
+
+    @cached_property
+    def moduli(self) -> Moduli | None:
+        """The bodies with other moduli; None if nothing is condensed."""
+        bulk = self.model.equilibrium.bulk
+        return Moduli(self.model.case, bulk) if type(bulk) is Condensed else None
+
+    def along(
+        self,
+        updates: Sequence[Trace],
+        wanted: Collection[int] = (),
+        values: Callable[[SidesInStep], dict[str, Array]] = lambda step: {},
+    ) -> tuple[list[Rates], float]:
+        """The derivatives along the updates of a path, of those whose numbers are wanted and of the
+        last one, and its `level_rise` at the end; values: of the sides (sides,) at a step's end.
+
+        Raises RunError if an update is a relaxation with frozen damage.
+        """
+        state, results = self.model.start(), list[Rates]()
+        for number, update in enumerate(updates):
             if update.frozen:
                 raise RunError(
                     f"sensitivity: the crack has grown unstably at level "
                     f"{update.state.loading.level:.6g} m; the state after it has no derivative"
                 )
-            linear = self.step(state, update)
+            step = SidesInStep(self, state, update)
+            step.solve()
+            step.finish()
             state = update.state
-            at_rest = state.time == 0 and bool(self.model.case["weight_first"])
-            results.append({n: p.end(state, at_rest) for n, p in self.parameters.items()})
-        return results, self.level_rise(updates, linear) if updates else math.inf
+            if state.time == 0 and self.model.case["weight_first"]:
+                self.crest_at_rest = step.displacement("crest")
+            if number in wanted or number == len(updates) - 1:
+                rates = {n: self.rate_of(v) for n, v in values(step).items()}
+                results.append(Rates(step.level_rate.copy(), rates, self.kink.copy()))
+        return results, self.level_rise(updates, step.linear) if updates else math.inf
+
+    def rate_of(self, values: Array) -> Array:
+        """The derivatives (parameters,) of values (sides,)."""
+        with np.errstate(invalid="ignore"):  # of an infinite safety factor
+            return np.asarray((values[self.number :] - values[: self.number]) / self.distance)
 
     def level_rise(self, updates: Sequence[Trace], linear: Linearised) -> float:
         """How much the level still rises with the displacement prescribed at the end of a path,
@@ -323,29 +474,309 @@ class Differentiation:
         _, (rate,) = linear.solve(np.zeros((size, 1)), np.ones(1))
         return float(rate * moved / risen) if risen else math.inf
 
-    def step(self, state: State, update: Trace) -> Linearised:
-        """Solve for the rates of all parameters at the end of a step from a state; its equation,
-        linearised there.
+
+class SidesInStep:
+    """All sides in a step, to first order around its end."""
+
+    def __init__(self, sides: Differentiation, state: State, update: Trace) -> None:
+        """state: in which the step begins; update: in which it ends."""
+        self.sides, self.before, self.end = sides, state, update.state
+        control, model = update.control, sides.model
+        self.control = control if isinstance(control, DisplacementControl) else None
+        self.unknown = self.control.unknown if self.control else LEVEL
+        self.problem = problem = model.begin(state, self.end.time).problem
+        here, border = problem.residual(self.end.jump, self.end.loading), None
+        if self.control:
+            given = Prescribed(self.control, model.equilibrium)
+            slope = here.by_unknown(self.unknown)
+            border = Border(slope, given.row, given.rate(self.end.loading), 0.0)
+        self.linear = Linearised(problem, here.by_jump(False), border)
+        #: of the parameters: rates of the jump and of what is unknown beside it
+        self.rate = np.zeros((sides.number, len(self.end.jump)))
+        self.level_rate = np.zeros(sides.number)
+        #: of the sides: their steps, if each is evaluated apart
+        self.begun = list[Begun]()
+        if sides.apart:
+            pairs = zip(sides.models, sides.states, strict=True)
+            self.begun = [one.begin(before, self.end.time) for one, before in pairs]
+        for alike in sides.alike:
+            alike.begin(state.time, self.end.time)
+
+        self.move()
+
+    # -- the sides at the end of the step
+
+    def move(self) -> None:
+        """Move the sides by the rates."""
+        half = self.sides.half
+        #: the jumps (sides, j); what is unknown beside them (sides,), less that of the end
+        self.jumps = self.end.jump + half[:, None] * np.tile(self.rate, (2, 1))
+        self.shifts = half * np.tile(self.level_rate, 2)
+
+    @cached_property
+    def loadings(self) -> list[Loading]:
+        """The loads of the sides at the level of the end."""
+        end = self.end
+        return [model.loading(end.time, end.loading.level) for model in self.sides.models]
+
+    def loading(self, side: int) -> Loading:
+        """The loads of a side."""
+        of = self.loadings[side]
+        if not self.control:
+            return of
+        return self.unknown.at(of, self.unknown.of(self.end.loading) + float(self.shifts[side]))
+
+    def at(self, matrix: CsrMatrix) -> Array:
+        """The jumps (sides, q, 3) at points, by `at_points` or `at_nodes` of the interface."""
+        dim = self.sides.model.equilibrium.interface.dim
+        jumps = np.zeros((len(self.sides.half), matrix.shape[0] // dim, 3))
+        jumps[:, :, :dim] = matrix.on_rows(self.jumps).reshape(len(jumps), -1, dim)
+        return jumps
+
+    def tractions(self, some: Sequence[int]) -> Array:
+        """The tractions (sides, q, 3) of the laws at the Gauss points, of some sides."""
+        jumps, chosen = self.at(self.sides.model.equilibrium.interface.at_points), set(some)
+        traction = np.zeros_like(jumps)
+        for part, joint in self.sides.of_joints(self.problem.variables.starts):
+            for alike in joint:
+                if chosen.isdisjoint(alike.sides.tolist()):
+                    continue
+                traction[alike.sides, part] = alike.traction(
+                    jumps[alike.sides, part], alike.begun[0]
+                )
+        return traction
+
+    def residuals(self, some: Sequence[int]) -> Array:
+        """The forces out of balance (sides, j); those that are not among some have no meaning."""
+        jumps, shifts, sides, problem = self.jumps, self.shifts, self.sides, self.problem
+        values = np.zeros_like(jumps)
+        if sides.apart:
+            for k in some:
+                at = jumps[k], self.loading(k)
+                values[k] = self.begun[k].problem.residual(*at).value
+            return values
+        values = (problem.stiffness @ jumps.T).T
+        base = sides.model.equilibrium
+        if self.control:
+            slope = rate(base.loads, self.end.loading, problem.size, self.unknown)
+        for k in some:
+            of = sides.models[k].equilibrium
+            if of.bulk is not base.bulk:
+                values[k] = of.bulk.stiffness @ jumps[k]
+            if of.loads is not base.loads:
+                values[k] -= of.loads(self.loading(k))
+            elif self.control:
+                values[k] -= base.loads(self.end.loading) + shifts[k] * slope
+            else:
+                values[k] -= base.loads(self.end.loading)
+        values += base.interface.forces(self.tractions(some))
+        if base.flowing:
+            values -= self.lifts(some)
+        return values
+
+    def lifts(self, some: Sequence[int]) -> Array:
+        """Forces (sides, j) of the water that flows: where it is that of the case, to first order
+        around the end.
         """
-        end = update.state
-        control = update.control if isinstance(update.control, DisplacementControl) else None
-        problem, border = self.model.begin(state, end.time).problem, None
-        here = problem.residual(end.jump, end.loading)
-        unknown = control.unknown if control else LEVEL
-        if control:
-            given = Prescribed(control, self.model.equilibrium)
-            border = Border(here.by_unknown(unknown), given.row, given.rate(end.loading), 0.0)
-        linear = Linearised(problem, here.by_jump(False), border)
-        under_way = [*self.parameters]
-        for part in self.parameters.values():
-            part.begin(end.time, len(end.jump), unknown)
-        for number in range(CORRECTIONS if under_way else 0):
-            parts = [self.parameters[name] for name in under_way]
-            rights = np.array([part.right(end) for part in parts]).T
-            gaps = np.array([part.gap(end, control) for part in parts])
-            changes, level_changes = linear.solve(rights, gaps)
-            pairs = zip(under_way, parts, changes.T, level_changes.tolist(), strict=True)
-            under_way = [n for n, p, x, s in pairs if p.add(x, s, number > 0)]
-            if not under_way:
+        end, base, water = self.end, self.sides.model.equilibrium, self.problem.water
+        assert water
+        total = np.zeros_like(self.jumps)
+        for system, nodal in zip(base.flowing, self.nodal, strict=True):
+            for joint in system.members:
+                beyond = joint.wetted.fields.on_rows(nodal[:, joint.nodes])
+                total += joint.lift(end.loading, beyond)
+        if self.control:
+            lift = lambda other: water.flow(end.jump, other).lift
+            slope = rate(lift, end.loading, self.problem.size, self.unknown)
+            total += self.shifts[:, None] * slope
+        for k in some:
+            of = self.sides.models[k].equilibrium
+            if of.flowing is not base.flowing:
+                step = of.water_in_step(water.variables)
+                total[k] = step.flow(self.jumps[k], self.loading(k)).lift
+        return total
+
+    @cached_property
+    def solved(self) -> list[tuple[Array, FlowDerivative | None]]:
+        """Of each `flowing` at the end: pressure beyond the imposed one at the nodes, and its
+        derivative with the unknowns at the inner ones.
+        """
+        end, water = self.end, self.problem.water
+        assert water
+        flow = water.flow(end.jump, end.loading)
+        return [
+            (
+                system.expand_to_nodes(solution),
+                system.derivative(end.jump, water.variables, solution, None),
+            )
+            for system, solution in zip(water.flowing, flow.solutions, strict=True)
+        ]
+
+    @property
+    def nodal(self) -> list[Array]:
+        """Of each `flowing` the pressure beyond the imposed one at the nodes (sides, n)."""
+        moved = self.jumps - self.end.jump
+        result = []
+        for system, (nodal, rates) in zip(
+            self.sides.model.equilibrium.flowing, self.solved, strict=True
+        ):
+            values = np.tile(nodal, (len(moved), 1))
+            if rates:
+                values[:, system.fields.inside] += moved[:, rates.columns] @ rates.pressure.T
+            result.append(values)
+        return result
+
+    # -- their derivatives
+
+    def solve(self) -> None:
+        """Solve for the rates; where they need more than a correction, the parameter has a kink."""
+        number = self.sides.number
+        some = np.arange(number)
+        for correction in range(CORRECTIONS if number else 0):
+            values = self.residuals([*some.tolist(), *(some + number).tolist()])
+            rights = ((values[:number] - values[number:]).T / self.sides.distance)[:, some]
+            change, level_change = self.linear.solve(rights, self.gaps()[some])
+            self.rate[some] += change.T
+            self.level_rate[some] += level_change
+            self.move()
+            if not correction:
+                continue
+            error, size = (np.linalg.norm(v, axis=-1) for v in (change.T, self.rate[some]))
+            seen = error * self.sides.distance[some] > ROUNDING * np.linalg.norm(self.end.jump)
+            self.sides.kink[some] |= seen & (error > KINK * size)
+            some = some[seen & (error > EXACT * size)]
+            if not len(some):
                 break
-        return linear
+
+    def gaps(self) -> Array:
+        """What is missing of the rates (parameters,) of a prescribed displacement; 0 without."""
+        border, control, number = self.linear.border, self.control, self.sides.number
+        if border is None or control is None:
+            return np.zeros(number)
+        gaps, base = -(self.rate @ border.row + border.rate * self.level_rate), self.sides.model
+        for k in range(number):
+            pair = k, k + number
+            of = [self.sides.models[side].equilibrium for side in pair]
+            if of[0].external_forces is not base.equilibrium.external_forces:
+                low, high = (
+                    control.measure(one, self.jumps[side], self.loading(side))
+                    for one, side in zip(of, pair, strict=True)
+                )
+                gaps[k] = (low - high) / self.sides.distance[k]
+        return np.asarray(gaps)
+
+    # -- the states of the sides, where the next step begins
+
+    def finish(self) -> None:
+        """End the step on all sides."""
+        sides, interface = self.sides, self.sides.model.equilibrium.interface
+        at_points, at_nodes = self.at(interface.at_points), self.at(interface.at_nodes)
+        for (of_points, joint), (of_nodes, _) in self.joints:
+            for alike in joint:
+                alike.finish(at_points[alike.sides, of_points], at_nodes[alike.sides, of_nodes])
+        if sides.apart:
+            sides.states = [self.state(k) for k in range(len(sides.half))]
+
+    @property
+    def joints(self) -> list[tuple[tuple[slice, list[Alike]], tuple[slice, list[Alike]]]]:
+        """The Gauss points and the nodes of each joint, with its sides alike."""
+        starts = self.end.variables.starts, self.end.node_variables.starts
+        return list(zip(*(self.sides.of_joints(s) for s in starts), strict=True))
+
+    def state(self, side: int) -> State:
+        """The state of a side at the end of the step."""
+        model, end = self.sides.models[side], self.end
+        water, jump, loading = self.begun[side].problem.water, self.jumps[side], self.loading(side)
+        parts = [
+            next(alike.of(side) for alike in joint if side in alike.sides)
+            for joint in self.sides.joints
+        ]
+        points, nodes = (tuple(part[k] for part in parts) for k in (0, 1))
+        assert water
+        return State(
+            time=end.time,
+            loading=loading,
+            jump=jump,
+            variables=replace(end.variables, joints=points),
+            node_variables=replace(end.node_variables, joints=nodes),
+            pressures=water.pressures(jump, loading),
+            stored=water.stored(jump, loading, end.time) if model.in_time else (),
+            before_quake=water.before_quake,
+        )
+
+    # -- what is recorded of the sides (sides,), as in `History`
+
+    def displacement(self, name: str) -> Array:
+        """A displacement of the bodies by its name [m]."""
+        pairs = zip(self.sides.models, self.jumps, strict=True)
+        return np.array(
+            [m.equilibrium.displacement(name, d, self.loading(k)) for k, (m, d) in enumerate(pairs)]
+        )
+
+    def pressures(self, joint: int) -> list[Pressure]:
+        """The water in a joint, by its number."""
+        sides, base, end = self.sides, self.sides.model.equilibrium, self.end
+        if sides.apart:
+            return [state.pressures[joint] for state in sides.states]
+        assert self.problem.water
+        water, variables, result = base.water[joint], self.problem.water.variables, []
+        nodal: Sequence[Array | None] = [None] * len(sides.half)
+        if water.system in base.flowing and not self.control:
+            nodal = list(self.nodal[base.flowing.index(water.system)][:, water.nodes])
+        for side, (model, jump) in enumerate(zip(sides.models, self.jumps, strict=True)):
+            of = model.equilibrium.water[joint]
+            if of is water and not (self.control or water.flowing):
+                result.append(end.pressures[joint])
+                continue
+            beyond = nodal[side] if of is water else None
+            result.append(of.pressure(jump, variables, self.loading(side), beyond=beyond))
+        return result
+
+    def row(self) -> dict[str, Array]:
+        """Time and level, the columns of history.csv that follow the parameters continuously, and
+        of each joint `crack_end`.
+        """
+        interface, number = self.sides.model.equilibrium.interface, len(self.sides.half)
+        at_points, at_nodes = (self.at(m) for m in (interface.at_points, interface.at_nodes))
+        row = {
+            "time": np.full(number, self.end.time),
+            "level": np.array([self.loading(k).level for k in range(number)]),
+            "crest_ux": self.displacement("crest") - self.sides.crest_at_rest,
+        }
+        for k, ((of_points, joint), (of_nodes, _)) in enumerate(self.joints):
+            of = self.row_of_joint(k, at_points[:, of_points], joint)
+            of["max_opening"] = at_nodes[:, of_nodes, 0].max(axis=1)
+            row |= {column_of(name, k): values for name, values in of.items()}
+        return row
+
+    def row_of_joint(self, number: int, jumps: Array, sides: list[Alike]) -> dict[str, Array]:
+        """Those of a joint, by its number, at jumps (sides, q, 3) of its Gauss points."""
+        base = self.sides.model.equilibrium
+        joint = base.interface.joints[number]
+        chord, weights = joint.chord, joint.points.weights / joint.width
+        traction = np.empty_like(jumps)
+        bonded, opening = np.empty(jumps.shape[:2]), np.empty(jumps.shape[:2])
+        for alike in sides:
+            law, flat = alike.law, jumps[alike.sides].reshape(-1, 3)
+            shape = len(alike.sides), len(weights)
+            traction[alike.sides] = alike.traction(jumps[alike.sides], alike.points)
+            bonded[alike.sides] = law.cohesion_left(flat, alike.points).reshape(shape)
+            of_crack = law.opening_of_crack(alike.points, len(flat))
+            opening[alike.sides] = of_crack.reshape(shape)
+        along_axes = np.einsum("sqk,qkc->sqc", traction, joint.frames[joint.points.elements])
+        N, T, M = chord.resultants(weights, joint.points.positions, along_axes)
+        pressures, wetted = self.pressures(number), base.water[number].wetted.points
+        water = np.array([one.water_points for one in pressures])
+        lifting = -water[:, :, None] * joint.surface.normals[wetted.elements]
+        U, _, _ = chord.resultants(wetted.weights / joint.width, wetted.positions, lifting)
+        length = self.sides.model.case.joints[number].joint_length
+        return {
+            "crack_end": crack_ends(joint, jumps[:, :, 0] - opening),
+            "bonded_length": bonded @ weights,
+            "N": N,
+            "T": T,
+            "M": M,
+            "U": U,
+            "x_resultant": length - np.divide(M, N, out=np.full(len(N), np.nan), where=N > 0),
+            "flux": np.array([one.leakage for one in pressures]),
+        }

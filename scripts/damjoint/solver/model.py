@@ -179,9 +179,15 @@ class Model:
         """
         if case is self.case:
             return self
+        other = self.sharing(case, self.equilibrium)
+        other.reference = other.unbalanced()
+        return other
+
+    def sharing(self, case: Case, equilibrium: Equilibrium) -> Model:
+        """A model of another case and equilibrium, whose convergence is measured as here."""
         other = object.__new__(Model)
-        other.case, other.equilibrium = case, self.equilibrium
-        other.reference, other.end_of_solution = other.unbalanced(), ""
+        other.case, other.equilibrium, other.reference = case, equilibrium, self.reference
+        other.end_of_solution = ""
         return other
 
     def unbalanced(self) -> float:

@@ -234,14 +234,18 @@ def alternatives(shortest: GravityMethod) -> str:
     return "".join([shortest.description, *longer])
 
 
-def factors_of_state(case: Case, state: Mapping[str, float]) -> dict[str, float]:
+def factors_of_state(
+    case: Case, state: Mapping[str, float], block: GravityMethod | None = None
+) -> dict[str, float]:
     """SSF, its cohesion and OSF of a state of the finite elements at a case's only joint, a row of
     the history: with its resultants, the cohesion that is left and, for OSF, the loads of the
     gravity method; it is nan for a user's own geometry, whose loads are known only in sum.
+
+    block: `with_crack` of no crack, where it is known.
     """
     overturning = math.nan
     if not case.geometry:
-        block = with_crack(case, state["time"], state["level"], 0.0)
+        block = block or with_crack(case, state["time"], state["level"], 0.0)
         overturning = overturning_factor(block.loads, block.resultant.moment - state["M"])
     return {
         "cohesion": cohesion(case, state["bonded_length"]),

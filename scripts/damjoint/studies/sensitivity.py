@@ -12,7 +12,7 @@ from textwrap import wrap
 import numpy as np
 
 from .. import InputError, RunError
-from ..arrays import Value
+from ..arrays import Array, Value
 from ..input.case import Case
 from ..input.parameters import declared, parameter
 from ..input.resolve import varied
@@ -23,12 +23,13 @@ from ..solver.derivatives import (
     NOT_CONTINUOUS,
     Differentiation,
     Side,
+    SidesInStep,
     half_difference,
     history_row,
 )
 from ..solver.load_stepper import LoadStepper
 from ..solver.path import Point
-from ..statics.gravity import factors_of_state
+from ..statics.gravity import factors_of_state, with_crack
 from ..threads import limited_threads
 from ..units import with_slash
 
@@ -74,6 +75,9 @@ OF_BODIES = (
     *("ice_force", "force_x", "force_y", "anchor_force", "traction_x", "traction_y"),
     *("temperature_dam", "temperature_linear", "temperature_found"),
 )
+
+#: Parameters with which the bodies are condensed anew, so that each takes seconds: by name only.
+CONDENSED = "nu", "nu_dam", "nu_found"
 
 #: Groups of parameters without an effect on a run, but for some of them.
 WITHOUT_EFFECT, BUT = ("Earthquake", "Checks"), ("factor_mu", "factor_c")
@@ -139,6 +143,8 @@ def all_of(case: Case) -> list[str]:
             continue
         if name in OF_BODIES and not case[name]:  # a load that does not act
             continue
+        if name in CONDENSED:
+            continue
         differs = known.of_joints and len({joint[name] for joint in case.joints}) > 1
         for one in [f"{j}.{name}" for j in case.joint_names] if differs else [name]:
             with contextlib.suppress(InputError):  # it follows from others
@@ -161,16 +167,16 @@ def of_run(case: Case, names: Sequence[str]) -> list[Sensitivity]:
         columns = list(with_all_joints(dict.fromkeys(CONTINUOUS, ("", "")), stepper.case))
         others = [name for name in names if is_of_geometry(stepper.case, name)]
         direct = [name for name in names if name not in others]
-        states, _ = Differentiation(stepper.model, direct).along(updates)
         ends = [max(i for i, u in enumerate(updates) if u.state.time == time) for time in saved]
+        rates, _ = Differentiation(stepper.model, direct).along(updates, ends, values_of_sides)
         rows = []
-        for name in direct:
+        for k, name in enumerate(direct):
             value, *_ = half_difference(stepper.case, name)
-            for last in ends:
-                derivative, level = states[last][name], updates[last].state.loading.level
-                row = derivative.row(values_of)
-                given = {c: row[c] for c in columns if c in row and np.isfinite(row[c])}
-                rows.append(Sensitivity(name, value, float(level), given, derivative.kink))
+            for last, of in zip(ends, rates, strict=False):
+                level = updates[last].state.loading.level
+                row = {c: float(of.values[c][k]) for c in columns if c in of.values}
+                given = {c: v for c, v in row.items() if np.isfinite(v)}
+                rows.append(Sensitivity(name, value, float(level), given, bool(of.kink[k])))
         for name in others:
             rows += of_two_runs(stepper, name, columns)
     return rows
@@ -186,6 +192,24 @@ def values_of(side: Side) -> dict[str, float]:
         state = of_joint | {n: row[n] for n in ("time", "level")}
         factors = factors_of_state(joint, state) if joint.law.limits_shear else {}
         row |= {column_of(name, k): factors.get(name, np.nan) for name in FACTORS}
+    return row
+
+
+def values_of_sides(step: SidesInStep) -> dict[str, Array]:
+    """The same of the sides of parameters at the end of a step, (sides,) each."""
+    row = step.row()
+    for k, joint in enumerate(step.sides.model.case.joints):
+        factors = np.full((len(FACTORS), len(row["time"])), np.nan)
+        if joint.law.limits_shear:
+            at = step.end.time, step.end.loading.level
+            block = None if joint.geometry else with_crack(joint, *at, 0.0)
+            for side, model in enumerate(step.sides.models):
+                state = {n: row[column_of(n, k)][side] for n in ("N", "T", "M", "bonded_length")}
+                state |= {n: row[n][side] for n in ("time", "level")}
+                same = not (step.control or step.sides.loading[side % step.sides.number])
+                of = factors_of_state(model.case.joints[k], state, block if same else None)
+                factors[:, side] = [of[name] for name in FACTORS]
+        row |= {column_of(name, k): values for name, values in zip(FACTORS, factors, strict=True)}
     return row
 
 
@@ -234,17 +258,17 @@ def of_point(point: Point, names: Sequence[str]) -> list[Sensitivity]:
         raise RunError("sensitivity: the path was followed without its updates")
     rows = []
     with limited_threads(1):
-        (*_, ends), rise = Differentiation(point.model, names).along(trace.updates)
+        (end,), rise = Differentiation(point.model, names).along(trace.updates)
         if abs(rise) > LIMIT_POINT:
             raise RunError(
                 "sensitivity: the critical level has no derivative: at its last equilibrium a "
                 "point is about to open, slip or break, or the crack grows unstably; search it "
                 "again with another value"
             )
-        for name, end in ends.items():
+        for k, name in enumerate(names):
             value, *_ = half_difference(point.model.case, name)
-            given = {"critical_level": end.level}
-            rows.append(Sensitivity(name, value, float(point.level), given, end.kink))
+            given = {"critical_level": float(end.level[k])}
+            rows.append(Sensitivity(name, value, float(point.level), given, bool(end.kink[k])))
     return rows
 
 
