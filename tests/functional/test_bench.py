@@ -4,14 +4,82 @@ asserted.
 
 import csv
 import json
+import shutil
 
 import pytest
 from damjoint_tools import bench_commands, bench_cost, bench_hard, bench_page
 from damjoint_tools.bench_table import Measurements
 
 
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    """The log of the short benchmark, with less hard scenes: its parts are measured once."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bench_hard, "NAMED", {"e": ("e", {"E_dam": 60e9})})
+        patch.setattr(bench_hard, "FEW", 2)
+        yield tmp_path_factory.mktemp("bench") / "measured.jsonl"
+
+
+@pytest.fixture
+def measurements(log):
+    """Those of the log."""
+    return Measurements(log, short=True)
+
+
 @pytest.mark.heavy
-def test_the_short_benchmark_writes_consistent_files(command, tmp_path):
+def test_seconds_of_several_joints(measurements):
+    measured = bench_cost.joints(measurements)
+    assert measured["joints"] == [1, 2] and measured["ratio"][0] == 1
+    one, two = measured["unknowns"]
+    assert two > one and min(measured["iterations"]) >= 3
+    parts = zip(*(measured[n] for n in ("condensation", "newton", "seconds")), strict=True)
+    assert all(a > 0 and b > 0 and a + b < total for a, b, total in parts)
+    assert measured["ratio"][1] == measured["seconds"][1] / measured["seconds"][0]
+    title, text, rows = bench_page.of_joints(measured)
+    assert title == "## Several joints" and "up to 2 joints" in text and rows.count("\n") == 3
+
+
+@pytest.mark.heavy
+def test_milliseconds_of_time_steps(measurements):
+    measured = bench_commands.quakes(measurements)
+    (scene,), (steps,) = measured["scene"], measured["steps"]
+    assert (scene, steps) == ("2D, order 1, 0.5 s", 200)
+    assert measured["seconds"][0] == pytest.approx(steps * measured["ms a step"][0] / 1e3)
+    expected = measured["GetDP: ms a step"][0] / measured["ms a step"][0]
+    assert measured["ratio"][0] == pytest.approx(expected)
+    assert 0 < measured["difference"][0] < 1e-5
+    title, text, rows = bench_page.of_quakes(measured)
+    assert title == "## Earthquake" and "ms a step" in text and rows.count("\n") == 2
+
+
+@pytest.mark.heavy
+def test_what_hard_scenes_wait_for(measurements):
+    """The parts of the time are of its whole; afterwards nothing is measured any more."""
+    solve = bench_hard.step.solve_from
+    table = bench_hard.hard(measurements)
+    assert bench_hard.step.solve_from is solve
+    assert table["scene"] == ["e", "random 1-0", "random 1-1"]
+    for solutions, given_up, iterations in zip(
+        table["solutions"], table["given up"], table["iterations"], strict=True
+    ):
+        assert 0 <= given_up <= solutions <= iterations
+    assert table["given up"][0] < table["solutions"][0]
+    for part in ("given up [%]", "linear systems [%]", "water [%]"):
+        assert all(0 <= share <= 100 for share in table[part])
+    assert table["water [%]"][0] > 0
+    seconds = table["seconds"]
+    chosen = bench_hard.slowest(table)["seconds"]
+    assert chosen == [seconds[0], *sorted(seconds[1:], reverse=True)]
+    title, text, rows = bench_page.of_hard(table)
+    assert title == "## Hard scenes in 2D" and "of 2 random dams" in text and rows.count("\n") == 4
+
+
+@pytest.mark.heavy
+def test_the_short_benchmark_writes_consistent_files(command, tmp_path, log):
+    """Also if it is resumed: from what the tests before have measured, where they ran."""
+    (tmp_path / "bench").mkdir()
+    if log.exists():
+        shutil.copy(log, tmp_path / "bench")
     assert command("bench", "--short", "--out", "bench")[0] == 0
     text = (tmp_path / "bench" / "benchmarks.md").read_text()
     assert text.startswith("# Benchmarks\n") and text.count("\n## ") == 16
@@ -56,53 +124,3 @@ def test_the_short_benchmark_writes_consistent_files(command, tmp_path):
     assert all(row["confirmed"] == "yes" for row in table("critical"))
     assert all(float(row["difference"]) < 1e-9 for row in table("orders"))
     assert [row["engine"] for row in table("engines")] == ["condensed", "iterative"]
-
-
-@pytest.mark.heavy
-def test_seconds_of_several_joints(tmp_path):
-    measured = bench_cost.joints(Measurements(tmp_path / "log", short=True))
-    assert measured["joints"] == [1, 2] and measured["ratio"][0] == 1
-    one, two = measured["unknowns"]
-    assert two > one and min(measured["iterations"]) >= 3
-    parts = zip(*(measured[n] for n in ("condensation", "newton", "seconds")), strict=True)
-    assert all(a > 0 and b > 0 and a + b < total for a, b, total in parts)
-    assert measured["ratio"][1] == measured["seconds"][1] / measured["seconds"][0]
-    title, text, rows = bench_page.of_joints(measured)
-    assert title == "## Several joints" and "up to 2 joints" in text and rows.count("\n") == 3
-
-
-@pytest.mark.heavy
-def test_milliseconds_of_time_steps(tmp_path):
-    measured = bench_commands.quakes(Measurements(tmp_path / "log", short=True))
-    (scene,), (steps,) = measured["scene"], measured["steps"]
-    assert (scene, steps) == ("2D, order 1, 0.5 s", 200)
-    assert measured["seconds"][0] == pytest.approx(steps * measured["ms a step"][0] / 1e3)
-    expected = measured["GetDP: ms a step"][0] / measured["ms a step"][0]
-    assert measured["ratio"][0] == pytest.approx(expected)
-    assert 0 < measured["difference"][0] < 1e-5
-    title, text, rows = bench_page.of_quakes(measured)
-    assert title == "## Earthquake" and "ms a step" in text and rows.count("\n") == 2
-
-
-@pytest.mark.heavy
-def test_what_hard_scenes_wait_for(tmp_path, monkeypatch):
-    """The parts of the time are of its whole; afterwards nothing is measured any more."""
-    monkeypatch.setattr(bench_hard, "NAMED", {"e": ("e", {"E_dam": 60e9})})
-    monkeypatch.setattr(bench_hard, "FEW", 2)
-    solve = bench_hard.step.solve_from
-    table = bench_hard.hard(Measurements(tmp_path / "log", short=True))
-    assert bench_hard.step.solve_from is solve
-    assert table["scene"] == ["e", "random 1-0", "random 1-1"]
-    for solutions, given_up, iterations in zip(
-        table["solutions"], table["given up"], table["iterations"], strict=True
-    ):
-        assert 0 <= given_up <= solutions <= iterations
-    assert table["given up"][0] < table["solutions"][0]
-    for part in ("given up [%]", "linear systems [%]", "water [%]"):
-        assert all(0 <= share <= 100 for share in table[part])
-    assert table["water [%]"][0] > 0
-    seconds = table["seconds"]
-    chosen = bench_hard.slowest(table)["seconds"]
-    assert chosen == [seconds[0], *sorted(seconds[1:], reverse=True)]
-    title, text, rows = bench_page.of_hard(table)
-    assert title == "## Hard scenes in 2D" and "of 2 random dams" in text and rows.count("\n") == 4

@@ -85,6 +85,7 @@ def test_a_linear_parameter_has_the_estimate_of_linear_regression(tmp_path):
     assert answer.squares == pytest.approx(np.sum((wanted - e * slope) ** 2), rel=1e-6)
 
 
+@pytest.mark.heavy
 def test_exact_measurements_give_the_parameters_that_made_them(tmp_path):
     truth = {"E_dam": 2.1e10, "E_found": 1.6e10, "temperature_dam": 5.0}
     dam = dj.case("dam", **{**COARSE, **SEASON, **truth})

@@ -28,7 +28,7 @@ class Reliability(WithTables):
     Example:
         >>> dry = case("dam", levels=[30, 36], n_joint=10, order=1, law="friction", adhesion=0.0)
         >>> likely = {"mu": "lognorm(0.12,scale=0.74)", "level": "gumbel_r(38.5,0.6)"}
-        >>> result = reliability(dry, **likely, samples=50, jobs=1)
+        >>> result = reliability(dry, **likely, samples=20, jobs=1)
         >>> round(result.beta, 2), result.words
         (2.71, ['FORM agrees with the samples'])
         >>> critical(result.design_case).mode
