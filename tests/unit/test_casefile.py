@@ -271,6 +271,7 @@ def test_values_that_may_be_in_another_unit_are_named(command, tmp_path):
     assert load("dam", {"lift_heights": (15.0,), "sigma_max": (2e5, 0.2)}).unusual == {
         "sigma_max": 0.2
     }
+    assert load("dam", {"dam_height": 45e3, "dam_base": 34.0}).unusual == {"dam_height": 45e3}
 
 
 def test_files_that_are_no_cases_are_refused(command, tmp_path):

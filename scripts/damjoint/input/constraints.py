@@ -35,6 +35,7 @@ USUAL = {
     "f_c": (1e5, 2e8),
     "ice_force": (1e3, 1e6),
     "visc": (1e-4, 0.1),
+    **dict.fromkeys(("dam_height", "dam_base"), (0.0, 1000.0)),
 }
 #: Values of larger magnitude are those of no material or load: with them rounding decides whether
 #: there is an equilibrium, which would be taken for a property of the dam. (A modulus up to the
