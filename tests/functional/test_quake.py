@@ -287,7 +287,9 @@ def test_free_vibration_decays_as_rayleigh_damping_says(tmp_path, braked):
     forces = of_joints @ mode[system.jumps]
     static = problem.static
     moved = replace(static, jump=static.jump + mode[system.jumps])
-    state = replace(problem.at_rest, state=moved, kept=start.at(problem.kept), forces=forces)
+    state = replace(
+        problem.at_rest, state=moved, retained=start.at(problem.retained), forces=forces
+    )
     step, crest = TimeStep(problem, dt), []
     nothing = np.zeros((2, system.size))
     for _ in range(600):

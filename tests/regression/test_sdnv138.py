@@ -110,7 +110,7 @@ def test_by_the_published_conventions(name):
     if case["order"] == 1:  # B begins with the acceleration of equilibrium
         (joint,) = quake.problem.model.equilibrium.interface.joints
         relative = quake.system.translation(joint, ["dam"], -quake.record.at(0.0))
-        quake.now = replace(quake.now, kept=Motion(*np.zeros((2, len(relative))), relative))
+        quake.now = replace(quake.now, retained=Motion(*np.zeros((2, len(relative))), relative))
     columns = quake_tests.columns(quake, static, 0.0, END)
     for quantity, value in published_values(name).items():
         assert columns[quantity][-1] == pytest.approx(value, rel=1e-6), quantity
