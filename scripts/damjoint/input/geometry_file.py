@@ -40,8 +40,9 @@ def geometry_file(name: str) -> Path:
         )
     raise InputError(
         f"geometry = {name}: must be a mesh in Gmsh's format, which ends in .msh and begins with "
-        f"{MESH.decode()} (gmsh FILE -save -o mesh.msh converts others), or a .geo. Gmsh might "
-        "run such a file as a program; if you trust it, add --run-geo"
+        f"{MESH.decode()} (gmsh FILE -save -o mesh.msh converts other meshes; drawings: "
+        'reference/usage.md, "Meshes and drawings of other programs"), or a .geo. Gmsh might run '
+        "such a file as a program; if you trust it, add --run-geo"
     )
 
 

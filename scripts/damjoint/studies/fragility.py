@@ -19,10 +19,10 @@ from pathlib import Path
 
 import numpy as np
 from scipy import optimize, stats
-from tabulate import tabulate
 
 from .. import InputError
 from ..arrays import Array, BoolArray, IntArray, Value
+from ..post.summary import aligned
 from ..storage import atomic_write
 from . import sampling
 from .plan import FRAGILITY, MOTION, Plan, Row, beside, numbers
@@ -238,6 +238,7 @@ def report(curves: Sequence[Fit], out: Path, intensity: str) -> str:
         if records > 1
         else f"{sampling.CONFIDENCE:.0%} interval of independent rows: rows of one record are not"
     )
-    table_of = tabulate(cells, "keys", disable_numparse=True)
+    heads = [name.replace(" [", "\n[") for name in cells[0]]
+    table_of = aligned([tuple(map(str, c.values())) for c in cells], heads, left=1, right=1)
     reasons = [f"{curve.words}: {curve.reason}" for curve in curves if curve.reason]
     return "\n".join([f"Fragility, lognormal in {intensity} ({how})", table_of, *reasons])
