@@ -23,6 +23,7 @@ def random_path(law_name: str, seed: int, case: Case) -> np.ndarray:
         "friction": case["adhesion"] / (case["mu"] * case["K_N"]),
         "bond": case["G_f"] / case["sigma_max"],
         "endo": case["G_f"] / case["sigma_max"],
+        "mixed": case["G_f"] / case["sigma_max"],
     }[law_name]
     walk = np.cumsum(rng.normal(size=(200, 3)), axis=0) * 0.3 * size
     walk[:, 1:] *= 5
@@ -64,7 +65,7 @@ def test_laws_agree_point_by_point(law_name, seed):
     laws_agree(law_name, seed, {})
 
 
-@pytest.mark.parametrize("law_name", ["bond", "rupture"])
+@pytest.mark.parametrize("law_name", ["bond", "rupture", "mixed"])
 @pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.heavy) for s in (0, 2))])
 def test_laws_of_exponential_softening_agree_point_by_point(law_name, seed):
     laws_agree(law_name, seed, EXPONENTIAL)
@@ -114,6 +115,7 @@ def laws_agree(law_name, seed, works):
         *(("rupture", works) for works in WORKS.values() if works),
         ("friction", WORKS["sawn"]),
         ("bond", EXPONENTIAL),
+        ("mixed", EXPONENTIAL),
         ("rupture", EXPONENTIAL | WORKS["grouted, sawn"]),
     ],
 )

@@ -49,6 +49,8 @@ LAWS = {
     "energy; friction remains, and slip opens the joint by mu",
     "bond": "coupled cohesive-frictional law: tensile strength and cohesion soften with their "
     "fracture energies, friction remains",
+    "mixed": "cohesive law of mixed mode: one equivalent jump softens tension and shear together; "
+    "no friction: a broken joint carries no shear",
 }
 UPLIFTS = {
     "none": "no water pressure",
@@ -238,7 +240,7 @@ def limits_of_joint(joint: Case) -> Iterator[str]:
     """Yield what the model of a joint includes: its law, its water, its drains."""
     law = LAWS.get(joint["law"], "a law of the user")
     yield f"Joint law {joint['law']}: {law}."
-    if joint["law"] in ("bond", "rupture") and joint["softening"] != "linear":
+    if joint["law"] in ("bond", "rupture", "mixed") and joint["softening"] != "linear":
         yield f"Softening by the {joint['softening']} curve, of the same strengths and energies."
     yield f"Water in the joint, uplift = {joint['uplift']}: {UPLIFTS[joint['uplift']]}."
     if has_drains(joint):
