@@ -29,7 +29,9 @@ def add(command: Parser) -> None:
     )
     command.add_jobs()
     command.add_wide()
-    command.add_engine(", for cases; tests of a point and of an earthquake: condensed")
+    command.add_engine(
+        ", for cases and paths of a load; tests of a point and of an earthquake: condensed"
+    )
 
 
 def call(arguments: argparse.Namespace) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..input.resolve import load
-from ..solver.load_stepper import LoadStepper
+from ..runner import compute
 
 
 @dataclass(frozen=True)
@@ -26,11 +26,11 @@ class PathTest:
     read_at: Sequence[tuple[float, bool]]
 
 
-def follow(test: PathTest) -> dict[str, Array]:
+def follow(test: PathTest, engine: str = "auto") -> dict[str, Array]:
     """Columns, a row per factor: t, the number of the row from 1; point_u [m], linear between the
-    steps.
+    steps. engine: see `engine_of`.
     """
-    history = LoadStepper(load(test.case)).run().history
+    history = compute(load(test.case), engine, fields=False).result.history
     return {"t": np.arange(1.0, len(test.read_at) + 1), "point_u": read(test, history)}
 
 

@@ -34,12 +34,12 @@ def chosen(names: Sequence[str]) -> dict[str, list[str]]:
 
 def tests_of(family: str) -> list[str]:
     """The tests of a family."""
-    return [*validation.modelings(family), *tests_without_case(family)]
+    return [*validation.modelings(family), *tests_without_case(family, "auto")]
 
 
-def tests_without_case(family: str) -> dict[str, Callable[[], dict[str, Array]]]:
+def tests_without_case(family: str, engine: str) -> dict[str, Callable[[], dict[str, Array]]]:
     """The tests of a family that are not static runs of a case: functions that compute their
-    columns, a row per step.
+    columns, a row per step. engine: of the paths of a load, see `engine_of`.
     """
     laws = law_tests.FAMILIES.get(family, dict)()
     quakes = quake_tests.FAMILIES.get(family, dict)()
@@ -48,7 +48,7 @@ def tests_without_case(family: str) -> dict[str, Callable[[], dict[str, Array]]]
     for name, law in laws.items():
         tests[name] = partial(law_tests.follow, law)
     for name, path in path_tests.FAMILIES.get(family, dict)().items():
-        tests[name] = partial(path_tests.follow, path)
+        tests[name] = partial(path_tests.follow, path, engine)
     for name, quake in quakes.items():
         tests[name] = partial(quake_tests.follow, quake, validation.last_time(family))
     for name, wedge in wedges.items():
@@ -91,7 +91,7 @@ def compare(
 def compare_test(task: tuple[str, str, Options], progress: bool) -> list[Comparison]:
     """Run a test of a family."""
     family, name, options = task
-    others = tests_without_case(family)
+    others = tests_without_case(family, options.engine)
     if name in others:
         return list(validation.compare_steps(family, name, others[name]()))
     case, compared = load(name), list[Comparison]()
