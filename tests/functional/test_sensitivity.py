@@ -179,6 +179,11 @@ def test_the_factors_of_a_check(command, tmp_path):
     expected = float(row["N"]) / float(row["T"])
     assert float(table["mu"]["SSF"]) == pytest.approx(expected, rel=1e-6)
     assert command(*words, "--sensitivity", "mu,dam_base")[1] == out  # from the files
+    code, out, _ = command(*words, "--sensitivity", "mu,dam_base", "--vary", "mu=normal(0,0.25)")
+    line = next(line for line in out.splitlines() if line.startswith("mu  "))
+    assert float(line.split()[3]) == 0.25
+    assert float(line.split()[4]) == pytest.approx(0.25 * expected, rel=5e-3)  # three digits
+    assert code == 0 and not any(line.startswith("dam_base") for line in out.splitlines())
     assert "Change by" not in command(*words)[1]
 
 
@@ -226,6 +231,25 @@ def test_the_table_of_a_critical_level(command, tmp_path, texts_drawn):
     assert out.index("rho_dam") < out.index("mu  ")
 
 
+def test_changes_of_a_critical_level_by_one_standard_deviation(command, tmp_path, texts_drawn):
+    """Of the density more than of friction here, other than by one percent each."""
+    settings = [w for n, v in SLIDES.items() for w in ("--set", f"{n}={v}")]
+    words = "critical", "dam", *settings, "--set", "mu=0.6", "--levels", "30,36", "--out", "out"
+    vary = "--vary", "mu=uniform(0.5,0.1)", "--vary", "rho_dam=normal(2400,100)"
+    code, out, _ = command(*words, "--sensitivity", "all", *vary)
+    _, by_mu, by_rho = slopes(0.6)
+    lines = out[out.index("Change by one standard deviation more") :].splitlines()
+    listed = [line.split() for line in lines if line.startswith(("mu", "rho_"))]
+    assert code == 0 and [cells[0] for cells in listed] == ["rho_dam", "mu"]
+    expected = 100 * by_rho, 0.1 / np.sqrt(12) * by_mu
+    assert [float(cells[-1]) for cells in listed] == pytest.approx(expected, rel=5e-3)
+    assert (tmp_path / "out/dam_sensitivity.png").exists()
+    drawn = next(texts for texts in texts_drawn if "one standard deviation more" in texts)
+    assert {"mu", "rho_dam"} <= set(drawn) and "g" not in drawn
+    code, out, _ = command(*words, "--sensitivity", "f_c")
+    assert code == 0 and out.endswith("sensitivity: no effect of f_c\n")
+
+
 @pytest.mark.parametrize(
     "words, message",
     [
@@ -237,6 +261,13 @@ def test_the_table_of_a_critical_level(command, tmp_path, texts_drawn):
         (["run", "lifts", "--sensitivity", "mu"], "differs between the joints; must be of one"),
         (["run", "dam", "--sensitivity", "no.mu"], "--sensitivity no.mu: must be of a joint: base"),
         (["critical", "dam", "--of", "strength", "--sensitivity", "mu"], "needs --of level"),
+        (["run", "dam", "--vary", "mu=normal(1,0.1)"], "--vary: needs --sensitivity"),
+        (["run", "dam", "--sensitivity", "mu", "--vary", "rho_dam=normal(1,1)"], "must be a param"),
+        (["check", "dam", "--sensitivity", "mu", "--vary", "mu=t(1.5)"], "a finite standard dev"),
+        (
+            ["critical", "dam", "--sensitivity", "ice_force", "--vary", "ice_force=norm(1,1)"],
+            "zero",
+        ),
     ],
 )
 def test_bad_input_is_one_line_and_writes_nothing(command, tmp_path, words, message):

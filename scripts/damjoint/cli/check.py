@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .cases import load_cases
-from .options import CASE, Parser, say, table_width
+from .options import CASE, Parser, deviations, say, table_width
 
 if TYPE_CHECKING:
     from ..input.case import Case
@@ -44,7 +44,8 @@ def call(arguments: argparse.Namespace) -> int:
     from ..studies.check_tables import text_table
 
     cases, out = load_cases(arguments, arguments.cases), arguments.out
-    checks = check_cases(cases, out, arguments.jobs, arguments.sensitivity or "")
+    derivatives = arguments.sensitivity or "", deviations(arguments)
+    checks = check_cases(cases, out, arguments.jobs, *derivatives)
     errors = [f"{check.case.name}: {check.accuracy}" for check in checks if check.accuracy]
     derived = changes_of(cases, out, table_width(arguments)) if arguments.sensitivity else []
     say(

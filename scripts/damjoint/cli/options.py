@@ -161,12 +161,19 @@ class Parser(argparse.ArgumentParser):
         )
 
     def add_sensitivity(self, what: str, note: str = "") -> None:
-        """Add the option of derivatives; what: of which result; note: what else a name does."""
+        """Add the options of derivatives; what: of which result; note: what else a name does."""
         self.add_argument(
             "--sensitivity",
             metavar="NAME,NAME,...",
             help=f"derivatives of {what} with these parameters, in the unit of each; of one joint: "
             f"'lift 25 m.mu'; all: of all that have an effect{note} (default: none)",
+        )
+        self.add_list(
+            "--vary",
+            "NAME=DISTRIBUTION",
+            help="with --sensitivity: an uncertain parameter, as in reliability: "
+            "mu=normal(1.0,0.15); what one standard deviation of each changes is printed and "
+            "drawn, instead of one percent (repeatable)",
         )
 
     def add_wide(self) -> None:
@@ -193,6 +200,30 @@ class Parser(argparse.ArgumentParser):
             metavar="ADDRESS",
             help="run on the dask.distributed scheduler at this address (default: this machine)",
         )
+
+
+def pairs(option: str, texts: list[str], example: str) -> dict[str, str]:
+    """The texts NAME=WHAT of an option by name. Raises InputError."""
+    result: dict[str, str] = {}
+    for text in texts:
+        name, equals, what = (part.strip() for part in text.partition("="))
+        if not equals or not name or not what:
+            raise InputError(f"{option} {text}: must be NAME=..., such as {example}")
+        if name in result:
+            raise InputError(f"{option} {name}: must be given once")
+        result[name] = what
+    return result
+
+
+def deviations(arguments: argparse.Namespace) -> dict[str, float]:
+    """Standard deviations of the uncertain parameters beside --sensitivity. Raises InputError."""
+    if not arguments.vary:
+        return {}
+    if not arguments.sensitivity:
+        raise InputError("--vary: needs --sensitivity")
+    from ..studies.sensitivity import deviations_of
+
+    return deviations_of(pairs("--vary", arguments.vary, "mu=normal(1.0,0.15)"))
 
 
 def table_width(arguments: argparse.Namespace) -> int | None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .. import InputError
 from .cases import load_case
-from .options import Parser, say
+from .options import Parser, pairs, say
 
 SUMMARY = (
     "probability that the water rises beyond the critical level: FORM, SORM, importance "
@@ -73,16 +72,3 @@ def call(arguments: argparse.Namespace) -> int:
     _, lines = reliability(case, variables, *options)
     say("\n".join(lines))
     return 0
-
-
-def pairs(option: str, texts: list[str], example: str) -> dict[str, str]:
-    """The texts NAME=WHAT of an option by name. Raises InputError."""
-    result: dict[str, str] = {}
-    for text in texts:
-        name, equals, what = (part.strip() for part in text.partition("="))
-        if not equals or not name or not what:
-            raise InputError(f"{option} {text}: must be NAME=..., such as {example}")
-        if name in result:
-            raise InputError(f"{option} {name}: must be given once")
-        result[name] = what
-    return result

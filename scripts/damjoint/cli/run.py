@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .cases import load_case
-from .options import Parser, say, table_width
+from .options import Parser, deviations, say, table_width
 
 if TYPE_CHECKING:
     from ..pictures.drawing_process import DrawingProcess
@@ -58,11 +58,12 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
     out = arguments.out or Path("out") / case.name
     fields, picture = not arguments.no_fields, drawing is not None
     code, options = 0, dict[str, Any]()
+    of_names = deviations(arguments)
     if arguments.sensitivity:
         from ..studies import sensitivity
 
-        names = sensitivity.names_of(case, arguments.sensitivity, geometry=True)
-        options["further"] = partial(sensitivity.write, names, picture)
+        names = sensitivity.names_of(case, arguments.sensitivity, True, of_names)
+        options["further"] = partial(sensitivity.write, names, picture, deviations=of_names)
     options |= {"engine": arguments.engine, "drawing": drawing}
     for result in run(case, out, fields, picture, **options):
         steps, iterations = len(result.history["time"]), int(result.history["iterations"].sum())

@@ -1,4 +1,6 @@
-"""Picture of derivatives: what one percent more or less of each parameter changes (a tornado)."""
+"""Picture of derivatives: what one percent, or one standard deviation, more or less of each
+parameter changes (a tornado).
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,7 @@ ENDING = "_sensitivity.png"
 
 def draw(listed: Sequence[Mapping[str, Value]], title: str, path: Path) -> None:
     """Draw changes (see `sensitivity.changes`), unless there are none."""
-    drawn = [cells for cells in listed if cells["value"]][:MOST]
+    drawn = [cells for cells in listed if cells.get("deviation", cells["value"])][:MOST]
     if drawn:
         write_picture(figure(drawn, title), path, 130)
 
@@ -34,12 +36,13 @@ def figure(drawn: Sequence[Mapping[str, Value]], title: str) -> Figure:
     text = "\n".join(wrap(title, int(14 * width)))
     picture.text(0.1 / width, 1 - 0.1 / height, text, va="top", fontsize=9, parse_math=False)
     rows = np.arange(len(drawn))
+    by = "one standard deviation" if "deviation" in drawn[0] else "1 %"
     for k, head in enumerate(heads):
         place = (1.4 + k * PANEL) / width, 0.55 / height, 0.85 * PANEL / width
         axes = picture.add_axes((*place, BAR * len(drawn) / height))
         sizes = np.array([float(cells[head]) for cells in drawn])
-        axes.barh(rows, sizes, color=BLUE, label="1 % more")
-        axes.barh(rows, -sizes, color=ORANGE, label="1 % less")
+        axes.barh(rows, sizes, color=BLUE, label=f"{by} more")
+        axes.barh(rows, -sizes, color=ORANGE, label=f"{by} less")
         axes.axvline(0, color="black", linewidth=0.6)
         axes.set_yticks(rows, [str(cells["parameter"]) for cells in drawn] if not k else [])
         axes.set_ylim(len(drawn) - 0.5, -0.5)

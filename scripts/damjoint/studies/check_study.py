@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,10 +26,15 @@ from .keys import key_of
 
 
 def check_cases(
-    cases: list[Case], out: Path, jobs: int | None = None, derivatives: str = ""
+    cases: list[Case],
+    out: Path,
+    jobs: int | None = None,
+    derivatives: str = "",
+    deviations: Mapping[str, float] | None = None,
 ) -> list[SafetyCheck]:
     """Run cases, each into its folder below out, and check them; jobs: number of processes;
-    derivatives: parameters with which the factors are differentiated, as `--sensitivity`.
+    derivatives: parameters with which the factors are differentiated, as `--sensitivity`;
+    deviations: their standard deviations, see `sensitivity.changes`.
 
     Writes check.csv into out after each case; gravity.csv and CASE_check.png into each scene's
     folder, but not for a user's own geometry. Cases that have come to their end are not computed
@@ -37,11 +43,12 @@ def check_cases(
     names = [case.name for case in cases]
     for case in cases:
         if derivatives:
-            sensitivity.names_of(case, derivatives, geometry=True)
+            sensitivity.names_of(case, derivatives, True, deviations or ())
         if names.count(case.name) > 1:
             raise InputError(f"case {case.name}: must be given once, and have its own name")
         engine_of(case, "auto")
-    tasks, checks = {out / case.name: (case, out / case.name, derivatives) for case in cases}, []
+    also = derivatives, dict(deviations or {})
+    tasks, checks = {out / case.name: (case, out / case.name, *also) for case in cases}, []
     for of_cases in several(check_case, tasks, out, jobs, "check"):
         checks = [check for of_case in of_cases for check in of_case]
         rows = [row for check in checks for row in check.rows]
@@ -49,10 +56,10 @@ def check_cases(
     return checks
 
 
-def check_case(task: tuple[Case, Path, str], progress: bool) -> list[SafetyCheck]:
+def check_case(task: tuple[Case, Path, str, dict[str, float]], progress: bool) -> list[SafetyCheck]:
     """Run a case into a folder, or read its results of an earlier command, and check it."""
-    case, out, derivatives = task
-    further = [derivatives] if derivatives else []
+    case, out, derivatives, deviations = task
+    further = [derivatives, *deviations.items()] if derivatives else []
     key = key_of(case, case.accuracy, case.also_uplift, *further)
     folder_of = partial(folders.scene_folder, case, out=out)
     results = list[Results]()
@@ -63,8 +70,8 @@ def check_case(task: tuple[Case, Path, str], progress: bool) -> list[SafetyCheck
         options: dict[str, Any] = {}
         if derivatives:
             names = sensitivity.names_of(case, derivatives, geometry=True)
-            printed = sensitivity.PRINTED_OF_CHECKS
-            options["further"] = partial(sensitivity.write, names, True, printed=printed)
+            write = partial(sensitivity.write, names, True, deviations=deviations)
+            options["further"] = partial(write, printed=sensitivity.PRINTED_OF_CHECKS)
         results = run(case, out, progress=progress, key=key, **options)
     checks = list[SafetyCheck]()
     for result in results:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -36,10 +36,15 @@ AFTER_GROWTH = 1e-3
 
 
 def critical(
-    case: Case, of: str, out: Path | None = None, sensitivity: Sequence[str] = ()
+    case: Case,
+    of: str,
+    out: Path | None = None,
+    sensitivity: Sequence[str] = (),
+    deviations: Mapping[str, float] | None = None,
 ) -> tuple[CriticalValue, list[str]]:
     """Find a critical value of a case and write its files below out (default out/CASE_critical);
-    sensitivity: parameters by which a critical level is differentiated.
+    sensitivity: parameters by which a critical level is differentiated; deviations: their standard
+    deviations, see `sensitivity.changes`.
 
     Returns the result, and its lines of text. A search that is interrupted or fails writes its
     trials.
@@ -55,11 +60,18 @@ def critical(
             raise answer.error
         lines = printed_lines(answer, search)
         if sensitivity and answer.point and answer.value is not None:
-            lines += ["", *derivative_lines(case.name, study.out, answer.point, sensitivity)]
+            what = study.out, answer.point, sensitivity, deviations
+            lines += ["", *derivative_lines(case.name, *what)]
     return answer, lines
 
 
-def derivative_lines(name: str, out: Path, point: Point, names: Sequence[str]) -> list[str]:
+def derivative_lines(
+    name: str,
+    out: Path,
+    point: Point,
+    names: Sequence[str],
+    deviations: Mapping[str, float] | None = None,
+) -> list[str]:
     """Write the derivatives of a critical level and their picture, with the name of the case; what
     is printed of them.
     """
@@ -70,7 +82,10 @@ def derivative_lines(name: str, out: Path, point: Point, names: Sequence[str]) -
     write_csv(
         out / sensitivities.FILE, {n: np.array(v) for n, v in sensitivities.table(rows).items()}
     )
-    changes = sensitivities.changes(rows, (("critical_level", "m", 1.0),))
+    printed = (("critical_level", "m", 1.0),)
+    changes = sensitivities.changes(rows, printed, deviations=deviations)
+    if not changes:
+        return [sensitivities.no_effect(deviations or names)]
     case = replace(point.model.case, name=name)
     sensitivities.draw_changes(changes, case, point.level, out)
     return [sensitivities.text(changes)]

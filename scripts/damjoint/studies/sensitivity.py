@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -64,6 +64,9 @@ LIMIT_POINT = 1e-4
 ALL = "all"
 
 
+#: Column of a parameter's standard deviation among the changes.
+DEVIATION = "deviation"
+
 #: The same in `damjoint check`.
 PRINTED_OF_CHECKS = (
     *(("SSF", "-", 1.0), ("OSF", "-", 1.0)),
@@ -107,13 +110,25 @@ class Sensitivity:
         return parameter(self.name.rpartition(".")[2]).unit
 
 
-def names_of(case: Case, text: str, geometry: bool = False) -> list[str]:
+def names_of(
+    case: Case, text: str, geometry: bool = False, uncertain: Iterable[str] = ()
+) -> list[str]:
     """Parameters from a text NAME,NAME,..., or all of a case but those of the geometry.
 
-    geometry: whether these are allowed. Raises InputError if one of them has no derivative.
+    geometry: whether these are allowed; uncertain: some of them. Raises InputError if one of them
+    has no derivative, or if an uncertain one is none of them or a load of zero.
     """
-    if text.strip() == ALL:
-        return all_of(case)
+    names = all_of(case) if text.strip() == ALL else listed_in(case, text, geometry)
+    for name in uncertain:
+        if name not in names:
+            raise InputError(f"--vary {name}: must be a parameter of --sensitivity {text}")
+        if name in OF_BODIES and not case[name]:
+            raise InputError(f"--vary {name}: is zero; give its mean by --set {name}=VALUE")
+    return names
+
+
+def listed_in(case: Case, text: str, geometry: bool) -> list[str]:
+    """Parameters from a text NAME,NAME,..., see `names_of`. Raises InputError."""
     names = [name.strip() for name in text.split(",")]
     for name in names:
         if not name or names.count(name) > 1:
@@ -121,6 +136,21 @@ def names_of(case: Case, text: str, geometry: bool = False) -> list[str]:
         if not (geometry and is_of_geometry(case, name)):
             half_difference(case, name)
     return names
+
+
+def deviations_of(distributions: Mapping[str, str]) -> dict[str, float]:
+    """Standard deviations of parameters by name, from their distributions as of a sample.
+
+    Raises InputError.
+    """
+    from .sampling import distribution
+
+    result = dict[str, float]()
+    for name, text in distributions.items():
+        result[name] = float(distribution(name, text, "--vary").std())
+        if not np.isfinite(result[name]):
+            raise InputError(f"--vary {name}={text}: must have a finite standard deviation")
+    return result
 
 
 def is_of_geometry(case: Case, name: str) -> bool:
@@ -292,6 +322,7 @@ def write(
     results: Results,
     folder: Path,
     printed: Sequence[tuple[str, str, float]] = PRINTED,
+    deviations: Mapping[str, float] | None = None,
 ) -> None:
     """Write the derivatives of a run into its folder, and their picture; what is printed of them,
     as in `changes`, is added to its info.
@@ -302,13 +333,17 @@ def write(
         results.info["sensitivity"] = {"statement": str(error), "changes": []}
         return
     write_csv(folder / FILE, {n: np.array(v) for n, v in table(rows).items()})
-    listed = changes(rows, printed, {n: abs(v) for n, v in results.last.items()})
-    shown = [entry["parameter"] for entry in listed]
-    without = dict.fromkeys(row.name for row in rows if row.name not in shown)
-    statement = "" if listed else f"sensitivity: no effect of {', '.join(without)}"
+    sizes = {n: abs(v) for n, v in results.last.items()}
+    listed = changes(rows, printed, sizes, deviations)
+    statement = "" if listed else no_effect(deviations or names)
     results.info["sensitivity"] = {"statement": statement, "changes": listed}
     if picture and listed:
         draw_changes(listed, results.case, rows[-1].level, folder)
+
+
+def no_effect(names: Iterable[str]) -> str:
+    """What is printed of parameters if none of them has an effect."""
+    return f"sensitivity: no effect of {', '.join(names)}"
 
 
 def draw_changes(
@@ -317,7 +352,8 @@ def draw_changes(
     """Draw changes at a level into the folder of a study of a case."""
     from ..pictures import sensitivity_picture as picture
 
-    title = f"{case.title}: change by one percent of a parameter, level {level:.6g} m"
+    by = "standard deviation" if DEVIATION in listed[0] else "percent"
+    title = f"{case.title}: change by one {by} of a parameter, level {level:.6g} m"
     picture.draw(listed, title, folder / f"{case.name}{picture.ENDING}")
 
 
@@ -325,31 +361,36 @@ def changes(
     rows: Sequence[Sensitivity],
     printed: Sequence[tuple[str, str, float]],
     sizes_of: Mapping[str, float] | None = None,
+    deviations: Mapping[str, float] | None = None,
 ) -> list[dict[str, Value]]:
     """What one percent more of each parameter changes at the last level, the largest change first;
     of a parameter that is zero, its unit, after the others. Those without an effect are left out.
-    sizes_of: of the results, by column, for what is round-off beside them.
+    sizes_of: of the results, by column, for what is round-off beside them. deviations: standard
+    deviations, by parameter; those listed are then these, with the change by one of them.
     """
+    rows = [row for row in rows if not deviations or row.name in deviations]
     last = [row for row in rows if row.level == rows[-1].level]
+    if not last:
+        return []
+    by_name = deviations or {row.name: 0.01 * row.value or 1.0 for row in last}
     printed = [entry for entry in printed if all(entry[0] in row.derivatives for row in last)]
     heads = [f"{name} [{unit}]" for name, unit, _ in printed]
     sizes = np.array(
-        [
-            [row.derivatives[n] * by * (0.01 * row.value or 1.0) for n, _, by in printed]
-            for row in last
-        ]
+        [[row.derivatives[n] * by * by_name[row.name] for n, _, by in printed] for row in last]
     )
     largest = np.abs(sizes).max(axis=0)
     if sizes_of:
         largest = np.maximum(largest, [sizes_of.get(n, 0.0) * by for n, _, by in printed])
     sizes[np.abs(sizes) < ROUNDING * largest] = 0.0
     listed: list[dict[str, Value]] = []
-    for k in sorted(range(len(last)), key=lambda k: (last[k].value == 0, -abs(sizes[k, 0]))):
+    after = [not deviations and row.value == 0 for row in last]
+    for k in sorted(range(len(last)), key=lambda k: (after[k], -abs(sizes[k, 0]))):
         row = last[k]
         if not sizes[k].any():
             continue
         unit = with_slash(row.unit)
         cells: dict[str, Value] = {"parameter": row.name, "unit": unit, "value": row.value}
+        cells |= {DEVIATION: deviations[row.name]} if deviations else {}
         cells |= dict(zip(heads, sizes[k].tolist(), strict=True))
         note = "at a kink" if row.kink else "of two runs" if row.of_runs else ""
         listed.append(cells | {"note": note})
@@ -361,15 +402,20 @@ def text(listed: Sequence[Mapping[str, Value]], width: int | None = None) -> str
     names = [name for name in listed[0] if name != "note"]
     rows = [
         tuple(
-            f"{v:.{4 if n == 'value' else 3}g}" if isinstance(v := row[n], float) else str(v)
+            f"{v:.{4 if n in ('value', DEVIATION) else 3}g}"
+            if isinstance(v := row[n], float)
+            else str(v)
             for n in names
         )
         for row in listed
     ]
     title = "Change by one percent more of a parameter (by its unit, if it is 0)"
+    if DEVIATION in names:
+        title = "Change by one standard deviation more of a parameter"
     heads = [name.replace(" [", "\n[") for name in names]
     shown = [name.partition(" [")[0] for name in names]
-    table = fitted(shown, heads, rows, shown[:3:-1], width, partial(aligned, left=2, right=-1))
+    first = 3 + (DEVIATION in names)  # result, always printed
+    table = fitted(shown, heads, rows, shown[:first:-1], width, partial(aligned, left=2, right=-1))
     lines = [title, table]
     for note in dict.fromkeys(row["note"] for row in listed if row["note"]):
         of = ", ".join(str(row["parameter"]) for row in listed if row["note"] == note)
