@@ -10,10 +10,12 @@ from damjoint.engines.condensed.solve import check
 from damjoint.input.resolve import load
 from damjoint.joint.flow_in_time import TimeStep
 from damjoint.model.loads import Loading
+from damjoint.pictures import water_picture
 from damjoint.solver.controls import LevelControl
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.solver.model import Model, StepOptions
 from damjoint.statics.hints import hints
+from damjoint.studies.report import water_of
 
 WATER, VISC = 9810.0, 1e-3
 #: Dam of 28 m on a joint without tension, that opens under 40 m of water.
@@ -258,10 +260,14 @@ def test_a_dry_end_gives_no_water_to_drains_below_it():
 
 
 def test_water_flows_in_time_in_a_lift_only():
-    """Whatever the uplift of the first joint."""
+    """Whatever the uplift of the first joint; picture and report name the lift."""
     lifts = {"lift_heights": (15.0,), "uplift": ("none", "flow"), "n_joint": 8.0, "order": 1.0}
     results = dam((40.0,), steps=2, time_unit=3600.0, **lifts).run()
     assert results.last["water"] == 0 and results.last["water_2"] > 0
+    title = water_picture.figure(results).texts[0].get_text()
+    assert title.startswith("own dam, water in lift 15 m in time")
+    text = water_of(results.joints[1], "lift 15 m")
+    assert f"Water in lift 15 m at the end: {1e3 * results.last['water_2']:.4g} l/m" in text
 
 
 def test_steady_before_the_start():

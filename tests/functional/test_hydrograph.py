@@ -6,6 +6,7 @@ from damjoint import InputError, cli
 from damjoint.input import hydrograph
 from damjoint.input.resolve import load
 from damjoint.post import stored
+from damjoint.studies import report_input
 
 SMALL = "--set", "n_joint=10", "--set", "h_dam=4", "--set", "h_found=8"
 CASE = 'default_uplift = "flow"; default_dam_base = 28; hydrograph = "flood.csv";'
@@ -77,3 +78,13 @@ def test_a_flood_with_picture_and_report(command, tmp_path, monkeypatch, texts_d
     assert cli.main(["report", "flood", "--to", "page.html"]) == 0
     page = (tmp_path / "page.html").read_text()
     assert "Flow in time" in page and "Water in the joint at the end" in page
+    hours = rows["time"] - 1
+    for name, text, factor, unit in (
+        ("water", "Most water", 1e3, "l/m"),
+        ("p_max", "highest pressure", 1e-3, "kPa"),
+    ):
+        most, at = factor * rows[name].max(), hours[rows[name].argmax()]
+        assert f"{text}: {most:.4g} {unit} at {at:.4g} h" in page
+    assert "none flows into rock or concrete" in page and "smooth faces" not in page
+    limits = list(report_input.limits(load("flood", {"turbulent": 1.0})))
+    assert sum("beyond a Reynolds number of 2041 turbulent" in line for line in limits) == 1

@@ -47,7 +47,7 @@ def draw(results: Results, folder: Path) -> Path:
 @picture_style()
 def figure(results: Results) -> Figure:
     """The figure, of the first joint in which water flows in time."""
-    result = next(r for r in results.joints if r.case["uplift"] == "flow")
+    joint, result = next((k, r) for k, r in enumerate(results.joints) if r.case["uplift"] == "flow")
     case, rows = result.case, result.history
     unit, factor = unit_of_time((rows["time"][-1] - case["time_start"]) * case["time_unit"])
 
@@ -55,7 +55,8 @@ def figure(results: Results) -> Figure:
         return (t - case["time_start"]) * case["time_unit"] * factor
 
     picture = figure_of(*SIZE)
-    title = f"{case.title}, water in the joint in time: {verdict(results)}"
+    name = results.case.named((joint,)) or "the joint"
+    title = f"{results.case.title}, water in {name} in time: {verdict(results)}"
     picture.text(0.05, 0.985, title, va="top", fontsize=10, parse_math=False)
     facts = "at the end: " + "\n".join(facts_of(results))
     picture.text(0.05, 0.955, facts, va="top", fontsize=8, color=DARK, parse_math=False)
@@ -66,12 +67,12 @@ def figure(results: Results) -> Figure:
     levels.plot(time, rows["level"][shown], color=BLUE, label="reservoir [m]")
     levels.plot(time, rows["crack_length"][shown], color=RED, label="open length [m]")
     levels.set_ylabel("m", fontsize=8)
-    for name, color, words in (
+    for column, color, words in (
         ("water", WATER, "stored"),
         ("water_in", ORANGE, "inflow"),
         ("void", GREY, "void"),
     ):
-        water.plot(time, 1e3 * rows[name][shown], color=color, label=f"{words} [l/m]")
+        water.plot(time, 1e3 * rows[column][shown], color=color, label=f"{words} [l/m]")
     water.set_ylabel("litres per m", fontsize=8)
 
     times = [t for t in np.unique(result.joint["time"]) if t >= case["time_start"] - 1e-9]

@@ -19,6 +19,7 @@ from .. import ROUND_OFF, InputError, RunError, __version__
 from ..dynamics.record_files import STANDARD_GRAVITY
 from ..input.case import Case
 from ..input.case_names import is_name
+from ..input.values import flows_in_time
 from ..model.fields import Solution
 from ..model.results import Info, Results
 from ..pictures import run_picture
@@ -31,7 +32,7 @@ from ..statics.gravity import GravityMethod
 from ..statics.rigid_block import force, resultant_of
 from ..statics.verdict import stiffness_ratio
 from ..storage import atomic_write
-from ..units import FORCES, MOMENTS, Units, unit
+from ..units import FORCES, MOMENTS, Units, unit, unit_of_time
 from . import body_stress, report_input, report_quake
 from .check import (
     NOT_JUDGED,
@@ -354,15 +355,41 @@ def further_pictures(folder: Path, result: Results) -> dict[str, Picture]:
     pictures, last = dict[str, Picture](), result.last
     water, fit = (folder / f"{result.case.name}_{n}.png" for n in ("water", "calibration"))
     if water.is_file() and "water_in" in last:
-        caption = (
-            f"Water in the joint at the end: {1e3 * last['water']:.4g} l/m, of which "
-            f"{1e3 * last['water_in']:.4g} l/m have come in; void {1e3 * last['void']:.3g} l/m."
+        caption = " ".join(
+            water_of(joint, result.case.named((k,)) or "the joint")
+            for k, joint in enumerate(result.joints)
+            if flows_in_time(joint.case)
         )
         pictures["Flow in time"] = Picture("bands", caption, bands(water))
     calibration = result.info.get("calibration")
     if fit.is_file() and calibration:
         pictures["Calibration"] = Picture("bands", calibration["verdict"], bands(fit))
     return pictures
+
+
+def water_of(result: Results, name: str) -> str:
+    """The water in a joint in which it flows in time, at the end and at most, in words."""
+    case, last = result.case, result.last
+    shown = result.history["time"] >= case["time_start"] - ROUND_OFF
+    rows = {column: values[shown] for column, values in result.history.items()}
+    seconds = (rows["time"] - case["time_start"]) * case["time_unit"]
+    hours, factor = unit_of_time(seconds[-1])
+    most = rows["water"].max()
+
+    def litres(column: str) -> str:
+        """Volume at the end, 0 if it is rounding."""
+        return f"{1e3 * last[column] * (abs(last[column]) > ROUND_OFF * most) + 0.0:.4g} l/m"
+
+    def at_most(column: str) -> str:
+        return f"at {seconds[rows[column].argmax()] * factor:.4g} {hours}"
+
+    return (
+        f"Water in {name} at the end: {litres('water')}, of which {litres('water_in')} have come "
+        f"in; void {litres('void')}. "
+        f"Most water: {1e3 * most:.4g} l/m {at_most('water')}; highest pressure: "
+        f"{rows['p_max'].max() / 1e3:.4g} kPa {at_most('p_max')}; largest Reynolds number: "
+        f"{rows['Re'].max():.3g} {at_most('Re')}."
+    )
 
 
 def state_of_last(last: Mapping[str, float], quake: Mapping[str, Any] | None) -> str:

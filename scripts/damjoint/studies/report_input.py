@@ -20,7 +20,7 @@ from ..input.parameters import (
     parse,
 )
 from ..input.resolve import equal_steps
-from ..input.values import flows, has_drains
+from ..input.values import flows, flows_in_time, has_drains
 from ..units import STRESSES, Units, unit
 
 #: Units by the unit in the declarations; other units are printed as they are.
@@ -242,7 +242,14 @@ def limits_of_joint(joint: Case) -> Iterator[str]:
     yield f"Joint law {joint['law']}: {law}."
     if joint["law"] in ("bond", "rupture", "mixed") and joint["softening"] != "linear":
         yield f"Softening by the {joint['softening']} curve, of the same strengths and energies."
-    yield f"Water in the joint, uplift = {joint['uplift']}: {UPLIFTS[joint['uplift']]}."
+    water = UPLIFTS[joint["uplift"]]
+    if joint["uplift"] == "flow" and joint["turbulent"]:
+        water += "; beyond a Reynolds number of 2041 turbulent, between smooth faces"
+    yield f"Water in the joint, uplift = {joint['uplift']}: {water}."
+    if flows_in_time(joint):
+        yield (
+            "Flow in time: the joint stores water as it opens; none flows into rock or concrete."
+        )
     if has_drains(joint):
         yield (
             f"Drains {joint['drain_x']:g} m from the heel with an effectiveness of "
