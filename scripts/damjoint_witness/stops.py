@@ -86,6 +86,11 @@ class Joint:
         return Forces(total - U, T, moment - M_U)
 
 
+def friction(v: Values) -> float:
+    """Friction coefficient of a joint; the law mixed has none."""
+    return 0.0 if v["law"] == "mixed" else float(v["mu"])
+
+
 def strengths(rows: Table, v: Values) -> tuple[Array, Array]:
     """Largest tension (q,) that points have left, and shear (q,) at this tension, from which on it
     grows by mu times the pressure [Pa]; infinite without a bound.
@@ -93,6 +98,8 @@ def strengths(rows: Table, v: Values) -> tuple[Array, Array]:
     damage, f, c, mu = rows["damage"], v["sigma_max"], v["adhesion"], v["mu"]
     if v["law"] == "bond":
         return f * (1 - damage), c * (1 - damage)
+    if v["law"] == "mixed":  # the rectangle around the ellipse
+        return f * (1 - damage), np.sqrt(v["K_T"] / v["K_N"]) * f * (1 - damage)
     if v["law"] == "rupture":
         left = 1 - damage if v["softening"] == "exponential" else np.where(damage < 1, 1.0, 0.0)
         return f * left, np.full(len(damage), np.inf)
@@ -114,7 +121,7 @@ def load_factor(joint: Joint, forces: Forces) -> float:
 
     A linear program for compression, beyond the tension left, and shear of the points.
     """
-    rows, section, mu = joint.points, joint.section, joint.values["mu"]
+    rows, section, mu = joint.points, joint.section, friction(joint.values)
     tension, shear = strengths(rows, joint.values)
     along = np.cos(section.slope), np.sin(section.slope)
     s = (rows["x"] - section.heel[0]) * along[0] + (rows["y"] - section.heel[1]) * along[1]
@@ -148,7 +155,7 @@ def slides(joint: Joint, forces: Forces) -> bool:
     """Whether the shear force exceeds the shear strength that is left under the normal force, and
     under the tension that acts in the last state and presses on the other points.
     """
-    rows, mu = joint.points, joint.values["mu"]
+    rows, mu = joint.points, friction(joint.values)
     tension, cohesion = strengths(rows, joint.values)
     # of the other laws the strength is linear in the normal stress, tension included
     bond = joint.values["law"] == "bond"
@@ -164,7 +171,7 @@ def equilibrium_is_certain(joint: Joint) -> bool:
     v, length, block = joint.values, joint.section.length, joint.forces(most_uplift=True)
     margin = max(SHARE_INSIDE, ELEMENTS_INSIDE / v["n_joint"]) * length
     inside = block.N > 0 and margin * block.N < block.M < block.N * (length - margin)
-    holds = v["law"] == "rupture" or CERTAIN_SAFETY * abs(block.T) < v["mu"] * block.N
+    holds = v["law"] == "rupture" or CERTAIN_SAFETY * abs(block.T) < friction(v) * block.N
     return bool(inside and holds and not (v["grout_pressure"] or v["time_unit"]))
 
 

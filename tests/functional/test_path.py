@@ -18,7 +18,9 @@ LAWS = {
     "friction": {"law": "friction", "adhesion": 2e4, "mu": 0.9},
     "rupture": {"law": "rupture", "alpha": 1},
     "rupture, shear kept": {"law": "rupture", "alpha": 2},
+    "mixed": {"law": "mixed", "sigma_max": 6e5, "G_f": 1000, "dam_base": 30},
 }
+LAWS["mixed, exponential"] = LAWS["mixed"] | {"sigma_max": 8e5, "softening": "exponential"}
 #: A brittle bond that breaks over 20 of 30 m at constant level, and friction that holds the dam.
 BRITTLE = {"law": "bond", "mu": 5, "dam_base": 30, "sigma_max": 2e6, "G_f": 100}
 BRITTLE |= {"adhesion": 5e6, "G_t": 1e5}

@@ -21,6 +21,7 @@ SCENES = {
     "bond": {"law": "bond", "uplift": "imposed", "sigma_max": 5e4, "adhesion": 5e4},
     "endo": {"law": "endo", "sigma_max": 5e4, "adhesion": 5e4, "uplift": "drained"},
     "grouted": {"law": "rupture", "uplift": "none", "grout_pressure": 4e5, "alpha": 2.0},
+    "mixed": {"law": "mixed", "uplift": "flow", "sigma_max": 8e5, "G_f": 500.0, "dam_base": 28.0},
     "sawn": {"law": "friction", "uplift": "none", "saw_thickness": 2e-4, "saw_t": 2.0},
 }
 SEVERAL = {
@@ -79,6 +80,8 @@ def test_the_laws_are_replayed_in_the_states_that_matter(runs):
     last = {name: runs(name).files.joint_tables[-1] for name in SCENES}
     for name in ("rupture", "bond", "endo"):
         assert 0 < last[name]["damage"].max() and last[name]["slip"].max() > 0
+    open_at_44_m = runs("mixed").files.joint_tables[1]["delta_n"] > 0
+    assert (last["mixed"]["damage"][open_at_44_m] > 0.01).any()
     assert last["friction"]["lambda"].max() > 1e-6
     assert last["grouted"]["joint_thickness"].max() > 1e-6 > 0
     assert last["sawn"]["joint_thickness"].min() < -1e-5
@@ -130,6 +133,8 @@ def zero_at_the_end(column):
         ("rupture", "steps", "tau_1", zero_at_the_end, "shear stress off"),
         ("friction", "steps", "lambda", lambda v: 0.9999 * v, "lambda off"),
         ("endo", "steps", "damage", lambda v: 0.99 * v, "damage off"),
+        ("mixed", "steps", "damage", lambda v: 0.99 * v, "damage off"),
+        ("mixed", "steps", "tau_1", zero_at_the_end, "shear stress off"),
         ("grouted", "steps", "joint_thickness", lambda v: 1.0001 * v, "joint_thickness off"),
         ("sawn", "steps", "joint_thickness", lambda v: 1.0001 * v, "joint_thickness off"),
         ("rupture", "joint", "delta_n", lambda v: 1.0001 * v, "delta_n of joint.csv"),
@@ -148,6 +153,9 @@ def test_an_altered_column_is_detected(runs, tmp_path, name, table, column, chan
         ("bond", "K_T", 4.9e10, "shear stress off"),
         ("rupture", "alpha", 1.5, "shear stress off"),
         ("endo", "G_f", 101.0, "shear stress off"),
+        ("mixed", "G_f", 501.0, "shear stress off"),
+        ("mixed", "G_f", 501.0, "normal stress off"),
+        ("mixed", "K_T", 4.9e10, "shear stress off"),
         ("sawn", "saw_thickness", 2.01e-4, "joint_thickness off"),
         ("grouted", "grout_pressure", 4.01e5, "joint_thickness off"),
         ("several", "silt_height", 10.1, "T ="),
@@ -188,6 +196,23 @@ def test_the_reason_of_a_stop_is_judged_by_limit_analysis(tmp_path, level, law, 
     (tmp_path / "run.json").write_text(json.dumps(record))
     found = Witness(run.files).stop()
     assert found[0] == wrong and remark in found[1] and bool(remark) == bool(found[1])
+
+
+@pytest.mark.parametrize(
+    "factor, remark", [(0.99, ""), (1.01, "limit analysis by a factor of 1.01")]
+)
+def test_the_law_mixed_bears_shear_by_its_strength_without_friction(tmp_path, factor, remark):
+    """T = sqrt(K_T/K_N) f_t L is the limit of an undamaged joint, under pressure too."""
+    run = verified_run({"law": "mixed", "sigma_max": 4e6, "G_f": 1e5}, "38", tmp_path)
+    assert run.files.joint_tables[-1]["damage"].max() == 0
+    record = json.loads((tmp_path / "run.json").read_text())
+    record |= {"state": "stopped", "verdict": "sliding"}
+    (tmp_path / "run.json").write_text(json.dumps(record))
+    shear = 1000 * 9.81 * 38**2 / 2
+    strength = factor * shear / 34 / np.sqrt(0.5)  # of 34 m, K_T = K_N/2
+    words = (*run.files.words, "--set", f"sigma_max={float(strength)!r}")
+    wrong, found = Witness(replace(run.files, words=words, exit_code=1)).stop()
+    assert not wrong and remark in found and bool(remark) == bool(found)
 
 
 @pytest.mark.heavy

@@ -50,7 +50,7 @@ LAWS = {
     "bond": "coupled cohesive-frictional law: tensile strength and cohesion soften with their "
     "fracture energies, friction remains",
     "mixed": "cohesive law of mixed mode: one equivalent jump softens tension and shear together; "
-    "no friction: a broken joint carries no shear",
+    "no friction: a broken joint carries no shear, while the safety factors count mu and c",
 }
 UPLIFTS = {
     "none": "no water pressure",

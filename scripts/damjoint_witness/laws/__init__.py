@@ -8,6 +8,7 @@ from __future__ import annotations
 from .bond import Bond
 from .endo import Endo
 from .friction import Friction
+from .mixed import Mixed
 from .point import Point
 from .rupture import Rupture
 
@@ -15,5 +16,6 @@ LAWS: dict[str, type[Point]] = {
     "bond": Bond,
     "endo": Endo,
     "friction": Friction,
+    "mixed": Mixed,
     "rupture": Rupture,
 }
