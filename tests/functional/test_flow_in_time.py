@@ -15,6 +15,7 @@ from damjoint.solver.controls import LevelControl
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.solver.model import Model, StepOptions
 from damjoint.statics.hints import hints
+from damjoint.statics.notes import notes
 from damjoint.studies.report import water_of
 
 WATER, VISC = 9810.0, 1e-3
@@ -140,6 +141,57 @@ def test_the_steady_limit():
     assert first.history["max_opening"][-1] > 1e-4
 
 
+@pytest.fixture
+def scene(request, blocks):
+    """scene(**settings): a loading up to its last level with drains, with joints that meet, or in
+    3D; all of few elements.
+    """
+    drains = {"drains": 1.0, "drain_x": 4.0, "drain_effectiveness": 0.8}
+    solid = {"dim": 3.0, "thickness": 3.0, "hold_z": 1.0, "mesh_pattern": "layers"}
+    further = {"drains": drains, "3D": solid}.get(request.param)
+
+    def build(**settings):
+        if further is None:
+            return LoadStepper(blocks(("flow",) * 3, (6.0, 9.0), **settings).case)
+        coarse = {"n_joint": 12.0, "order": 1.0}
+        return dam((38.0, 43.0), 2, **coarse | further | settings)
+
+    return build
+
+
+ALL_SCENES = pytest.mark.parametrize("scene", ["drains", "junction", "3D"], indirect=True)
+
+
+@ALL_SCENES
+def test_the_steady_limit_of_networks(scene):
+    """With drains, at a junction of joints, in 3D: the pressure of each joint, and its opening."""
+    steady, slow = (scene(time_unit=unit).run() for unit in (0.0, 1e18))
+    for first, second in zip(steady.joints, slow.joints, strict=True):
+        for name in ("p", "delta_n"):
+            scale = np.abs(first.joint[name]).max()
+            assert second.joint[name] == pytest.approx(first.joint[name], abs=1e-12 * scale)
+    assert steady.joint["p"].max() > 5e4
+
+
+@ALL_SCENES
+def test_order_in_time_of_networks(scene):
+    """Joints that open linearly in time and store water: halved steps halve the error."""
+    settings = {"storage": 1e-8, "aperture_min": 5e-4, "pressure_min": -1e5}
+    model = scene(time_unit=1.0, drain_effectiveness=1.0, **settings).model
+    last = opened(model, [1e-4] * len(model.equilibrium.interface.joints))
+    pressures, inflow = [], []
+    for number in (20, 40, 80):
+        slot = Slot(model, 0 * last, Loading(model.case.levels[-1], 0.0))
+        for k in range(number):
+            pressure = slot.step((k + 1) / number * last, 60 / number)
+        pressures.append(pressure)
+        inflow.append(slot.stored.inflow.sum())
+    for values in pressures, inflow:
+        coarse, fine = np.abs(np.diff(values, axis=0)).reshape(2, -1).max(axis=1)
+        assert coarse / fine == pytest.approx(2, abs=0.05)
+        assert fine > 1e-6 * np.abs(values).max()
+
+
 @pytest.mark.parametrize("lowest", [0.0, -1e5])
 @pytest.mark.parametrize("unit", [1.0, 600.0, 1e5])
 def test_mass_is_kept_in_every_step(unit, lowest):
@@ -214,6 +266,16 @@ def test_drains_take_water():
     history = drained.history
     assert history["U"][-1] < free.history["U"][-1]
     assert history["water"] - history["water_in"] == pytest.approx(2.8e-4, rel=1e-9)
+
+
+def test_drains_of_part_effect_are_noted():
+    """Their effect in a step is that on the water without drains, whatever the step's length."""
+    water = {"uplift": "flow", "time_unit": 600.0, "drains": 1.0}
+    part, full = (load("dam", water | {"drain_effectiveness": e}) for e in (0.8, 1.0))
+    (note,) = (text for text in notes(part) if "acts anew in each step" in text)
+    assert note.startswith("drain_effectiveness = 0.8 with flow in time")
+    assert not any("acts anew" in text for text in notes(full))
+    assert not any("acts anew" in text for text in notes(part.changed({"time_unit": 0.0})))
 
 
 def test_in_three_dimensions():
