@@ -5,7 +5,7 @@ from math import erfc
 import numpy as np
 import pytest
 from blocks import write_blocks
-from damjoint import InputError
+from damjoint import InputError, cli
 from damjoint.engines.condensed.solve import check
 from damjoint.input.resolve import load
 from damjoint.joint.flow_in_time import TimeStep
@@ -397,7 +397,7 @@ def test_a_film_without_compressibility_in_steps_of_milliseconds():
     assert not run.stopped and not run.history["cuts"].any()
 
 
-def test_a_sealed_joint_must_store_water(blocks):
+def test_a_sealed_joint_must_store_water(blocks, tmp_path, capsys):
     """The base of the middle one of three blocks, between dry joints: its volume is given."""
     bounds = {"left": (0, 5), "middle": (5, 10), "right": (10, 15)}
     three = {name: (a, 0, b, 10) for name, (a, b) in bounds.items()}
@@ -406,6 +406,11 @@ def test_a_sealed_joint_must_store_water(blocks):
     uplift = "none", "flow", "none", "none", "none"
     with pytest.raises(InputError, match="storage = 0: must be > 0"):
         blocks(uplift, (5.0,), three, joints)
+    values = "uplift=none", "middle base.uplift=flow", "time_unit=60", "order=1"
+    words = ["modes", str(tmp_path / "own.case"), "--levels", "5", "--out", str(tmp_path / "modes")]
+    assert cli.main([*words, *(word for value in values for word in ("--set", value))]) == 2
+    assert "storage = 0: must be > 0 in joints" in capsys.readouterr().err
+    assert not (tmp_path / "modes").exists()
     model = blocks(uplift, (5.0,), three, joints, storage=1e-9)
     slot = Slot(model, opened(model, [0.0] * 5))
     pressure = slot.step(opened(model, [0, 1e-4, 0, 0, 0]), 1.0)
