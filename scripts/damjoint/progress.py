@@ -39,7 +39,7 @@ class Progress:
         """total: of all updates; show: whether anything is printed; soon: whether also the first
         line comes as soon as a bar; options: of tqdm's bar.
         """
-        self.soon = soon
+        self.soon, self.stage = soon, ""
         self.title, self.total, self.done, self.options = title, total, 0.0, options
         self.start = self.updated = time.monotonic()
         self.over = threading.Event()
@@ -66,11 +66,11 @@ class Progress:
         if self.bar is not None:
             self.bar.update(self.done - self.bar.n)
 
-    def describe(self, title: str) -> None:
-        """Replace the title."""
-        self.title, self.updated = title, time.monotonic()
+    def describe(self, title: str, stage: str = "") -> None:
+        """Replace the title; stage: what is done beside the work that is counted."""
+        self.title, self.stage, self.updated = title, stage, time.monotonic()
         if self.bar is not None:
-            self.bar.set_description_str(title)
+            self.bar.set_description_str(", ".join(filter(None, [title, stage])))
 
     def show_bar(self) -> None:
         """Show the bar on the terminal, unless the work is over before."""
@@ -92,11 +92,11 @@ class Progress:
                 print(self.line(), file=sys.stderr, flush=True)
 
     def line(self) -> str:
-        """Title, part that is done, elapsed time, and how long there has been no update."""
+        """Title, part that is done, stage, elapsed time, and how long there has been no update."""
         now, parts = time.monotonic(), [self.title]
         if self.total:
             parts.append(f"{100 * self.done / self.total:.0f} %")
-        parts.append(clock(now - self.start))
+        parts += [*filter(None, [self.stage]), clock(now - self.start)]
         if now - self.updated > INTERVAL:
             parts.append(f"nothing new for {clock(now - self.updated)}")
         return ", ".join(parts)

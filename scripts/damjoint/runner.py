@@ -32,7 +32,7 @@ class RunProgress(Progress):
 
     def step(self, scene: int, now: float) -> None:
         """Advance to the time of a converged step; called by the engines."""
-        if self.title != self.name:
+        if self.title != self.name or self.stage:
             self.describe(self.name)
         self.update(now - self.reached[scene])
         self.reached[scene] = now
@@ -65,13 +65,14 @@ def run(
     drawing: DrawingProcess | None = None,
     key: str = "",
     further: Callable[[Results, Path], None] = lambda result, folder: None,
+    stage: str = "",
 ) -> list[Results]:
     """Solve all scenes of a case and write their results below out, replacing an earlier run's.
 
     fields: also write displacement, stress and joint fields for Gmsh and ParaView; picture: also a
     PNG; engine: see `engine_of`; drawing: draws the pictures, by
     default this process does; key: see `Session`; further: writes further tables of a scene into
-    its folder.
+    its folder; stage: what the progress says meanwhile.
     Returns the results in the order of case.scenes(). A run that stops early or is interrupted
     writes its converged steps. Raises InputError, RunError.
     """
@@ -80,6 +81,8 @@ def run(
         shown = RunProgress(case, progress)
         with shown:
             for outcome in accuracy.solve(case, solver, shown.step, fields or picture):
+                if stage:
+                    shown.describe(case.name, stage)
                 save(study, outcome, further)
                 outcomes.append(outcome)
                 if outcome.error:

@@ -206,6 +206,21 @@ def test_the_value_of_the_gravity_method_names_its_joint():
     assert shown + f"{answer.gravity_there:.6g} m" in "\n".join(printed_lines(answer, search))
 
 
+@pytest.mark.parametrize("crack, noted", [(0.0, True), (23.0, False)])
+def test_a_crack_of_the_gravity_method_that_is_longer_is_noted(crack, noted):
+    """It begins, long at once, where its linear stress at the heel is the strength."""
+    search = Search(load("lifts"), "level")
+    level, base = search.gravity.critical(50.0), search.case.joints[0]
+    before, after = (gravity.at(base, 3.0, level + step) for step in (-0.01, 0.01))
+    assert before.crack_length == 0 and before.tip_stress == pytest.approx(2e5, rel=0.01)
+    assert after.crack_length > 24 and after.SSF < 1
+    points = [SimpleNamespace(level=48.2 + k, last={"crack_length": crack}) for k in range(2)]
+    note = search.gravity.longer_crack(level, points)
+    beyond = gravity.at(base, 3.0, level * (1 + path.PRECISION)).description
+    assert (f"gravity method on base has {beyond}, as its linear stress" in note) == noted
+    assert note.endswith("strength of 200 kPa; the finite elements at 48.2 m: crack 0 m") == noted
+
+
 def test_the_gravity_method_with_a_crack_past_the_drains():
     """The short crack is in equilibrium up to the drains; mu N = T with the crack past them."""
     drains = {"dam_base": 30.0, "uplift": "cracked", "drains": 1.0, "drain_x": 6.0, "mu": 1.0}

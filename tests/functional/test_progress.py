@@ -46,6 +46,8 @@ def test_lines_have_title_part_done_and_time(frequent):
         err.wait_for(r"work, 75 %, 00:00")
         shown.describe("other work")
         err.wait_for(r"other work, 75 %, 00:0\d, nothing new for 00:0\d\n")
+        shown.describe("work", "derivatives")
+        err.wait_for(r"\nwork, 75 %, derivatives, 00:0\d")
 
 
 @pytest.mark.parametrize("total, shown", [(4, r"75%"), (None, r"3")])

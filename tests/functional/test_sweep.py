@@ -408,4 +408,6 @@ def test_rows_are_printed_in_a_table_that_fits_the_terminal():
     assert lines[3].split() == ["0.5", "stands", "45", "0", "0", "0", "4.3", "20.66", "-1.235"]
     assert len(lines) == 3 + 20 + 1 and lines[-1] == "... and 3 rows more"
     assert max(map(len, sweep.rows_table(plan, [row] * 2, 60).splitlines()[:-1])) <= 60
+    last, hint = sweep.rows_table(plan, [row] * 23, 60).splitlines()[-2:]
+    assert last == "... and 3 rows more" and hint.startswith("(--wide shows also: ")
     assert sweep.rows_table(plan, []) == ""

@@ -64,6 +64,7 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
 
         names = sensitivity.names_of(case, arguments.sensitivity, True, of_names)
         options["further"] = partial(sensitivity.write, names, picture, deviations=of_names)
+        options["stage"] = sensitivity.STAGE
     options |= {"engine": arguments.engine, "drawing": drawing}
     for result in run(case, out, fields, picture, **options):
         steps, iterations = len(result.history["time"]), int(result.history["iterations"].sum())

@@ -72,6 +72,7 @@ def check_case(task: tuple[Case, Path, str, dict[str, float]], progress: bool) -
             names = sensitivity.names_of(case, derivatives, geometry=True)
             write = partial(sensitivity.write, names, True, deviations=deviations)
             options["further"] = partial(write, printed=sensitivity.PRINTED_OF_CHECKS)
+            options["stage"] = sensitivity.STAGE
         results = run(case, out, progress=progress, key=key, **options)
     checks = list[SafetyCheck]()
     for result in results:

@@ -26,6 +26,10 @@ ASSUMPTIONS = {
     "without tension, with the crack past the drains": (False, True),
 }
 
+#: By how much the gravity method's crack is longer than that of the finite elements where a note
+#: says so, over the joint's length [-].
+LONGER = 0.1
+
 #: Relative distances from a value at which the gravity method's critical value is sought.
 DISTANCES = (0.02, 0.05, 0.1, 0.2, 0.5, 0.9)
 
@@ -58,7 +62,7 @@ class GravityValues:
                 where = self.failing_block(other, *assumptions)
                 others[f"{name} on {where}" if where else name] = other
         of_drains = self.drains(value, point, points) if point else ()
-        notes = filter(None, [self.tension(value), *of_drains])
+        notes = filter(None, [self.tension(value), self.longer_crack(by_hand, points), *of_drains])
         return replace(
             result,
             gravity=by_hand,
@@ -91,6 +95,30 @@ class GravityValues:
             f"the finite elements (n_joint = {case['n_joint']:g}), {heel}, exceeds the strength of "
             f"{most}"
         )
+
+    def longer_crack(self, level: float, points: Sequence[Point]) -> str:
+        """A note where the gravity method's critical level [m] is below one of the finite elements
+        as its crack is longer there than theirs; else empty.
+        """
+        above = [point for point in points if point.level >= level]
+        if self.of != "level" or not above:
+            return ""
+        pairs = (self.rigid_blocks(level * (1 + side * PRECISION)) for side in (-1, 1))
+        for k, (below, method) in enumerate(zip(*pairs, strict=True)):
+            if block_stands(method, False):
+                continue
+            crack = above[0].last[column_of("crack_length", k)]
+            if method.crack_length - crack <= LONGER * method.body.length:
+                continue
+            where = f" on {name}" if (name := self.case.named((k,))) else ""
+            strength, why = with_unit(method.case.law.tensile_strength, STRESSES), ""
+            if not below.crack_length:
+                why = f", as its linear stress at the heel passes the strength of {strength}"
+            return (
+                f"above {level:.6g} m the gravity method{where} has {method.description}{why}; the "
+                f"finite elements at {above[0].level:.6g} m: crack {crack:.4g} m"
+            )
+        return ""
 
     def drains(self, value: float, point: Point, points: Sequence[Point]) -> Iterator[str]:
         """Which crack passes the drains at a critical value, for each joint: of the finite elements

@@ -33,6 +33,8 @@ from ..statics.gravity import factors_of_state, with_crack
 from ..threads import limited_threads
 from ..units import with_slash
 
+#: What the progress says while they are computed.
+STAGE = "derivatives"
 #: The file of the derivatives of a run.
 FILE = "sensitivity.csv"
 

@@ -21,7 +21,7 @@ from ..input.resolve import equal_steps, resolve, with_drive_times
 from ..input.source import Source
 from ..joint.interface import Interface, interface_of
 from ..model.results import history_columns
-from ..post.summary import fitted
+from ..post.summary import Draw, aligned, fitted
 from ..processes import ProcessKilled, as_finished, check_jobs, number_of
 from ..progress import Progress, track
 from ..solver.load_stepper import LoadStepper
@@ -450,9 +450,10 @@ def rows_table(plan: Plan, rows: list[Row], width: int | None = None) -> str:
     heads = [f"{n}\n[{units[n]}]" if units.get(n, "-") not in ("-", "") else n for n in names]
     if not rows:
         return ""
-    table = fitted(names, heads, cells, results[:0:-1], width)
     more = len(rows) - PRINTED
-    return f"{table}\n... and {more} rows more" if more > 0 else table
+    rest = f"\n... and {more} rows more" if more > 0 else ""
+    drawn: Draw = lambda rows, heads: aligned(rows, heads) + rest
+    return fitted(names, heads, cells, results[:0:-1], width, drawn)
 
 
 def unit_of(name: str) -> str:
