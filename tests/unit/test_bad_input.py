@@ -143,7 +143,10 @@ def test_a_parameter_out_of_range_is_refused(command, tmp_path, setting, allowed
             ("time_unit = 60", "must be 0", "critical value"),
         ),
         (
-            ("run", "e", "--set", "time_unit=60", "--set", "drains=1", "--engine", "getdp"),
+            (
+                *("run", "e", "--set", "time_unit=60", "--set", "drains=1"),
+                *("--set", "drain_effectiveness=1", "--engine", "getdp"),
+            ),
             ("time_unit = 60", "must be 0", "engine = getdp", "drains = 1"),
         ),
         ((*RUN, "--out", "o\udcff"), (r"'o\udcff'", "must be text", "LANG=C.UTF-8")),
