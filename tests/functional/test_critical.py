@@ -343,7 +343,7 @@ def test_a_missing_limit_is_reported(command):
     "case, of, message",
     [
         ("c", "visc", "visc has no effect; it needs uplift = flow"),
-        ("a", "mu", "mu has no effect; it needs law not rupture"),
+        ("a", "mu", "mu has no effect; it needs law not rupture and law not mixed"),
     ],
 )
 def test_a_parameter_without_effect_is_not_varied(case, of, message):

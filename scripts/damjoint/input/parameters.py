@@ -113,7 +113,8 @@ class Parameter:
 
     def matters_in(self, values: Mapping[str, Value]) -> bool:
         """Whether the parameter matters with the values of all parameters."""
-        return not self.matters or any(holds(c, values) for c in self.matters.split(" or "))
+        ways = [way.split(" and ") for way in self.matters.split(" or ")]
+        return not self.matters or any(all(holds(c, values) for c in way) for way in ways)
 
     def allowed(self) -> str:
         """The allowed values, as text."""
@@ -339,7 +340,7 @@ def condition_text(condition: str) -> str:
     """The condition of a Visible option, as text."""
     words = re.sub(r'!StrCmp\((\w+), "(\w+)"\)', r"\1 = \2", condition)
     words = re.sub(r'StrCmp\((\w+), "(\w+)"\)', r"\1 not \2", words)
-    for mark, word in (("==", "="), ("!= 0", "not 0"), ("||", "or")):
+    for mark, word in (("==", "="), ("!= 0", "not 0"), ("||", "or"), ("&&", "and")):
         words = words.replace(mark, word)
     return words.strip("()")
 

@@ -35,6 +35,7 @@ from .critical_value import CriticalValue
 from .critical_words import (
     beyond_limit,
     by_increments,
+    end_at_drains,
     end_of_branch,
     events_on,
     falls_at_once,
@@ -303,6 +304,8 @@ class Search:
             result = replace(result, mode="sliding", why=slips_whole(path), doubt="")
         elif not result.why and path.falls:
             result = replace(result, why=lost_beyond_limit(path), doubt="")
+        elif not result.why and path.stops and path.loses_drains:
+            result = replace(result, doubt=end_at_drains(path))
         elif not result.why and path.stops:
             result = replace(result, why=end_of_branch(path), doubt="")
             if path.entering and certain:  # each point that the water reaches turns the path

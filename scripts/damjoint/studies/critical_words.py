@@ -47,6 +47,14 @@ def end_of_branch(path: FailurePath) -> str:
     )
 
 
+def end_at_drains(path: FailurePath) -> str:
+    """What is said of a path that ends where a crack may take the effect of drains."""
+    return (
+        "there the branch of equilibria ends, but each point that the water reaches beside the "
+        "drains turns it: another path may lead to another level"
+    )
+
+
 def withdrawn(path: FailurePath) -> str:
     """What is said of a path on which the water leaves the crack."""
     return (

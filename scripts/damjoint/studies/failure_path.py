@@ -14,6 +14,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..input.case import Case
+from ..input.values import has_drains
 from ..joint.interface import Interface
 from ..model.loads import Loading
 from ..model.results import HISTORY, Columns, with_all_joints
@@ -191,6 +192,11 @@ class FailurePath(EquilibriumPath):
         element may follow.
         """
         return self.stops and not self.entering
+
+    @property
+    def loses_drains(self) -> bool:
+        """Whether a crack that reaches the drains of a joint takes their effect."""
+        return any(j["uplift"] == "cracked" and has_drains(j) for j in self.case.joints)
 
     @property
     def crushed(self) -> bool:
