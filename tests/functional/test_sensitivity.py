@@ -150,6 +150,11 @@ def test_a_load_that_is_zero_has_a_derivative_on_its_side():
     weight = 2400 * 9.81 * 45 * (34 + 5) / 2
     assert rows["k_v"].derivatives["N"] == pytest.approx(-weight, rel=1e-6)
     assert rows["ice_force"].derivatives["T"] == pytest.approx(1, rel=1e-4)
+    # the first force adds a point to the mesh, which moves the crest by itself
+    runs = [dj.run(dj.case("dam", levels=[20], n_joint=10, ice_force=f)) for f in (1e4, 2e4)]
+    crest = [run.history["crest_ux"][-1] for run in runs]
+    by_difference = (crest[1] - crest[0]) / 1e4
+    assert rows["ice_force"].derivatives["crest_ux"] == pytest.approx(by_difference, rel=0.02)
 
 
 def test_the_geometry_by_two_runs():

@@ -41,6 +41,7 @@ from ..joint.linear_system import Border, Tangent
 from ..joint.problem import JointProblem, rate
 from ..joint.water import Pressure
 from ..laws import Law
+from ..mesh.generate import MARKS
 from ..model.loads import LEVEL, Loading
 from ..model.results import column_of, history_table
 from ..threads import scipy_linalg
@@ -161,6 +162,8 @@ def half_difference(case: Case, name: str) -> tuple[float, float, float]:
     half = DIFFERENCE * abs(value) or ZERO.get(known.unit, 1e-5)
     low, high = value - half, value + half
     low, high = (end if known.allows(end) else value for end in (low, high))
+    if not value and of_joint in MARKS:  # the first force adds a point to the mesh: on both sides
+        low, high = half, 2 * half
     if low == high:
         raise InputError(
             f"--sensitivity {name}: has the value {value:g}, which follows from others"
