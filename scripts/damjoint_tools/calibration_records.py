@@ -3,14 +3,13 @@
     python -m damjoint_tools.calibration_records out/calibrations.csv
 
 A row per record: whether the interval of each free parameter contains the truth, whether the right
-model is rejected, and, of every tenth record, whether the model without drains is. Rows that the
-file has are kept.
+model is rejected, and, of every tenth record, whether the model without drains is. Rows that are
+in the file are not computed again.
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,10 +18,13 @@ from pathlib import Path
 import numpy as np
 from damjoint.arrays import Setting
 from damjoint.input.resolve import load, varied
+from damjoint.progress import track
 from damjoint.studies.calibrate import Fit, free_of
 from damjoint.studies.measurements import Measurements, Series
+from damjoint.studies.result_file import rows_session
 
-from .provenance import provenance, source_line
+from .provenance import RECORDED, provenance, source_line
+from .stress import read_rows
 
 #: Readings of a year, and their number in a record.
 OF_YEAR, READINGS = 6, 60
@@ -46,6 +48,12 @@ ERRORS = {"crest_ux": 5e-5, "head_10": 0.3}
 #: A wrong model, without drains, and of which records: every tenth.
 WRONG: dict[str, Setting] = {"uplift": "imposed"}
 OF_WRONG = 10
+
+#: Columns of the file.
+COLUMNS = (
+    *("record", *TRUTH, "converged", "rejected", "wrong_rejected", "seconds", "runs"),
+    *RECORDED,
+)
 
 
 def record(number: int) -> Measurements:
@@ -114,16 +122,13 @@ def main() -> None:
     parser.add_argument("--records", type=int, default=100, help="number of records")
     arguments = parser.parse_args()
     path: Path = arguments.file
-    rows = list(csv.DictReader(path.open(newline=""))) if path.exists() else []
     path.parent.mkdir(parents=True, exist_ok=True)
-    for number in range(len(rows), arguments.records):
-        row = row_of(number)
-        with path.open("a", newline="") as file:
-            writer = csv.DictWriter(file, list(row))
-            if not number:
-                writer.writeheader()
-            writer.writerow(row)
-    print(summary(list(csv.DictReader(path.open(newline="")))))
+    about, numeric = {"calibrations": {"records": arguments.records}}, ("record", "seconds")
+    with rows_session("calibrations", path, COLUMNS, numeric, about) as (study, done):
+        missing = [number for number in range(arguments.records) if str(number) not in done]
+        for row in track(map(row_of, missing), "calibrations", len(missing)):
+            study.add([str(row[name]) for name in COLUMNS])
+    print(summary(read_rows(path)))
 
 
 if __name__ == "__main__":

@@ -26,11 +26,9 @@ def add(command: Parser) -> None:
 
 def call(arguments: argparse.Namespace) -> int:
     """Run damjoint modes."""
-    from ..engines.condensed.solve import check
     from ..studies import modes_study
 
     case = load_case(arguments, arguments.case)
-    check(case)  # before a folder is written
     out = arguments.out or Path("out") / f"{case.name}_modes"
     natural = modes_study.run(case, arguments.number, out, not arguments.no_picture)
     say(f"{case.name}: {modes_study.about(natural)}; {out}\n\n{modes_study.text(natural)}")

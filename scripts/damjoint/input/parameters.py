@@ -332,8 +332,8 @@ def followers(name: str) -> frozenset[str]:
 @lru_cache(maxsize=1)
 def statements() -> list[tuple[str, set[str]]]:
     """What the statements of `computations` compute, and the words in their formulas."""
-    found = re.findall(STATEMENT, computations())
-    return [(name, set(re.findall(r"\w+", formula))) for name, formula in found]
+    matches = re.findall(STATEMENT, computations())
+    return [(name, set(re.findall(r"\w+", formula))) for name, formula in matches]
 
 
 def condition_text(condition: str) -> str:

@@ -65,10 +65,18 @@ class JointLaws:
         parts = self._each(Law.update_internal_variables, jump, variables)
         return JointVariables(tuple(parts), variables.starts)
 
-    def mean_thickness(self, variables: JointVariables) -> Array:
-        """Mean over each joint of its `Law.added_thickness` (joints,) [m]."""
-        parts = zip(self.laws, variables.joints, np.diff(variables.starts), strict=True)
-        return np.array([law.added_thickness(state, int(n)).mean() for law, state, n in parts])
+    def changes_of_thickness(self, before: JointVariables, begun: JointVariables) -> list[float]:
+        """Change of the mean `Law.added_thickness` of each joint as a step begins [m]; 0 where the
+        internal variables are the same objects, as in all joints without works.
+        """
+        numbers = np.diff(before.starts).tolist()
+        parts = zip(self.laws, before.joints, begun.joints, numbers, strict=True)
+        return [
+            0.0
+            if old is new
+            else float(law.added_thickness(new, n).mean() - law.added_thickness(old, n).mean())
+            for law, old, new, n in parts
+        ]
 
     def _each(
         self, method: Callable[..., Any], jump: Array, variables: JointVariables

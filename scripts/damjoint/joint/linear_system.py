@@ -46,8 +46,22 @@ class Tangent:
 
     @property
     def lift(self) -> CsrMatrix:
-        """Nodal forces of the pressures of the flowing water (j, p)."""
-        return stacked([part.lift.T for part in self.flowing]).T
+        """See `lift_of`."""
+        return lift_of(self.flowing)
+
+
+def lift_of(flowing: tuple[Flow, ...]) -> CsrMatrix:
+    """Nodal forces of the pressures of flowing water (j, p)."""
+    return stacked([part.lift.T for part in flowing]).T
+
+
+def matrix_of(assembly: Assembly, stiffness: Array, tangent: Tangent) -> Array:
+    """S + K (j, j); stiffness: S (j, j)."""
+    matrix = stiffness.copy()
+    assembly.whole(tangent.law).add_to(matrix)
+    if flow := tangent.flow:
+        matrix[:, flow.columns] -= tangent.lift @ flow.pressure
+    return matrix
 
 
 @dataclass(frozen=True)
@@ -91,7 +105,7 @@ class DenseSystem:
         return lu_solve(self.matrix(tangent), right), 0.0
 
     def matrix(self, tangent: Tangent) -> Array:
-        """S + K (j, j)."""
+        """S + K (j, j), as `matrix_of`, faster for few unknowns."""
         matrix = self.stiffness + self.assembly.dense(tangent.law)
         if flow := tangent.flow:
             matrix[:, flow.columns] -= tangent.lift @ flow.pressure
@@ -111,9 +125,7 @@ class WoodburySystem:
 
     def matrix(self) -> Array:
         """A_0 (j, j)."""
-        matrix = self.stiffness.copy()
-        self.assembly.whole(self.undamaged).add_to(matrix)
-        return matrix
+        return matrix_of(self.assembly, self.stiffness, Tangent(self.undamaged))
 
     @cached_property
     def small_matrix(self) -> Array | None:
@@ -131,7 +143,7 @@ class WoodburySystem:
     def lift(self, flowing: tuple[Flow, ...]) -> CsrMatrix:
         """B (j, p), the nodal forces of the pressures of flowing water; the last one is kept."""
         if self._lift is None or flowing != self._lift[0]:
-            self._lift = flowing, stacked([flow.lift.T for flow in flowing]).T
+            self._lift = flowing, lift_of(flowing)
         return self._lift[1]
 
     def by_pressure(self, lift: CsrMatrix) -> Array:

@@ -33,8 +33,8 @@ SIZE = 9.0, 7.0
 
 def has(results: Results) -> bool:
     """Whether there is flow in time to draw."""
-    timed = any(joint["uplift"] == "flow" and joint["time_unit"] for joint in results.case.joints)
-    return bool(timed and (results.joint["time"] > results.case["time_start"]).any())
+    later = results.joint["time"] > results.case["time_start"]
+    return bool(results.case.stores_water and later.any())
 
 
 def draw(results: Results, folder: Path) -> Path:

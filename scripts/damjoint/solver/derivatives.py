@@ -37,7 +37,7 @@ from ..input.values import flows, flows_in_time, freezes_uplift
 from ..joint.equilibrium import Equilibrium
 from ..joint.flow import FlowDerivative
 from ..joint.interface import JointInterface
-from ..joint.linear_system import Border, Tangent
+from ..joint.linear_system import Border, Tangent, matrix_of
 from ..joint.problem import JointProblem, rate
 from ..joint.water import Pressure
 from ..laws import Law
@@ -125,15 +125,15 @@ def crack_ends(joint: JointInterface, beyond: Array) -> Array:
         return np.full(len(beyond), math.nan)
     along = joint.chord.along[:2]
     heel = (joint.space.locations[:, :2] @ along).min()
-    place = joint.points.positions[:, :2] @ along - heel
-    order = np.argsort(place)
-    place, beyond, rows = place[order], beyond[:, order], np.arange(len(beyond))
+    position = joint.points.positions[:, :2] @ along - heel
+    order = np.argsort(position)
+    position, beyond, rows = position[order], beyond[:, order], np.arange(len(beyond))
     closed = beyond <= 0
     first = closed.argmax(axis=1)
     last = np.maximum(first - 1, 0)
     step = beyond[rows, last] - beyond[rows, first]
     part = np.divide(beyond[rows, last], step, out=np.zeros(len(rows)), where=first > 0)
-    ends = place[last] + part * (place[first] - place[last])
+    ends = position[last] + part * (position[first] - position[last])
     return np.where(closed.any(axis=1), np.where(first > 0, ends, 0.0), joint.length)
 
 
@@ -187,10 +187,8 @@ class Linearised:
         Raises LinAlgError if the system is singular.
         """
         assert not isinstance(self.problem.stiffness, CsrMatrix)
-        matrix, tangent = self.problem.stiffness.copy(), self.tangent
-        self.problem.interface.assembly.whole(tangent.law).add_to(matrix)
-        if tangent.flow:
-            matrix[:, tangent.flow.columns] -= tangent.lift @ tangent.flow.pressure
+        assembly = self.problem.interface.assembly
+        matrix = matrix_of(assembly, self.problem.stiffness, self.tangent)
         if border := self.border:
             corner = np.array([[border.rate]])
             matrix = np.block([[matrix, border.slope[:, None]], [border.row[None], corner]])
@@ -380,14 +378,15 @@ class Differentiation:
             whole = Model(other)
             whole.equilibrium.laws = model.equilibrium.laws
             return whole
-        of_law = known.group == "Joint" or of_joint in OF_LAW
-        with_laws = model.equilibrium.with_laws(other)
-        if of_law and not (self.apart or any(map(water_differs, case.joints, other.joints))):
-            return model.sharing(other, with_laws)
-        if of_joint in OF_LOADS or (known.group == "Loads" and not of_law):
-            return model.sharing(other, model.equilibrium.with_loads(other))
-        equilibrium = Equilibrium(other, model.equilibrium.interface)
-        equilibrium.laws = with_laws.laws if of_law else model.equilibrium.laws
+        same_loads = model.equilibrium
+        if known.group == "Joint" or of_joint in OF_LAW:
+            same_loads = same_loads.with_laws(other)
+            if not (self.apart or any(map(water_differs, case.joints, other.joints))):
+                return model.sharing(other, same_loads)
+        elif of_joint in OF_LOADS or known.group == "Loads":
+            return model.sharing(other, same_loads.with_loads(other))
+        equilibrium = Equilibrium(other, same_loads.interface)
+        equilibrium.laws = same_loads.laws
         return model.sharing(other, equilibrium)
 
     def without_followers(self, values: Mapping[str, float]) -> set[str]:
@@ -504,7 +503,6 @@ class SidesInStep:
             self.begun = [one.begin(before, self.end.time) for one, before in pairs]
         for alike in sides.alike:
             alike.begin(state.time, self.end.time)
-
         self.move()
 
     # -- the sides at the end of the step

@@ -175,11 +175,8 @@ class LoadStepper:
 
     def accept(self, step: StepResult, cuts: int) -> None:
         """Commit a converged step; cuts: how often it was shortened."""
-        weight, new, old = self.case["rho_water"] * self.case["g"], step.state, self.state
-        rise = np.abs([new.loading.level - old.loading.level, new.loading.tail - old.loading.tail])
-        move = self.move_of_pressure(step) - weight * float(rise.max())
-        if move > self.largest_move[1]:
-            self.largest_move = (new.time, move)
+        if step.state.stored:
+            self.record_move(step)
         self.state = step.state.after(self.state)
         self.history.add(step, cuts)
         if self.drives:
@@ -267,6 +264,14 @@ class LoadStepper:
                 strategies[:1] if quick else strategies, extrapolate=True, persist=smallest
             ),
         )
+
+    def record_move(self, step: StepResult) -> None:
+        """Record the largest change of the pressure in a step beyond that of the levels."""
+        new, old = step.state.loading, self.state.loading
+        rise = max(abs(new.level - old.level), abs(new.tail - old.tail))
+        move = self.move_of_pressure(step) - self.model.equilibrium.unit_weight * rise
+        if move > self.largest_move[1]:
+            self.largest_move = (step.state.time, move)
 
     def moves_pressure(self, step: StepResult) -> bool:
         """Whether the pressure of water that flows in time changes by more than `pressure_step`."""

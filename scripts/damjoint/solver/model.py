@@ -133,10 +133,11 @@ class Begun:
         from the last state the whole joint would be open.
         """
         laws, joints = self.model.equilibrium.laws, self.model.equilibrium.interface.joints
-        now, new = (laws.mean_thickness(s.variables) for s in (self.state, self.start))
-        if not (new - now).any():
+        changes = laws.changes_of_thickness(self.state.variables, self.start.variables)
+        if not any(changes):
             return None
-        return sum(d * joint.unit_opening for d, joint in zip(new - now, joints, strict=True))
+        parts = (change * joint.unit_opening for change, joint in zip(changes, joints, strict=True))
+        return np.asarray(sum(parts))
 
     def predict(self, control: Control, extrapolate: bool) -> tuple[Array, float]:
         """See `Model.predict`; a joint that is sawn closes."""

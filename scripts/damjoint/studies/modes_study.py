@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..dynamics.modes import NaturalModes, natural_modes
+from ..engines.condensed.solve import check
 from ..fem.factor import single_thread
 from ..input.case import Case
 from ..input.constraints import ZANGAR
@@ -33,6 +34,7 @@ def run(case: Case, number: int, out: Path, picture: bool = True) -> NaturalMode
 
     Raises InputError, RunError.
     """
+    check(case)  # before a folder is written
     with session(case, out) as study:
         natural = compute(case, number)
         columns = {name: column.tolist() for name, column in natural.table.items()}

@@ -143,14 +143,14 @@ def intensities(record: Record, period: float) -> dict[str, Any]:
 
 
 def lift_offs(quake: Earthquake, rows: Table) -> list[str]:
-    """What is said of the joints that open throughout and land again: a line with the numbers of
+    """What is parts of the joints that open throughout and land again: a line with the numbers of
     each, if there is one.
     """
-    case, said, shortest = quake.case, list[str](), math.inf
-    for number, own in enumerate(case.joints):
+    case, parts, shortest = quake.case, list[str](), math.inf
+    for number, joint_case in enumerate(case.joints):
         joint = quake.problem.model.equilibrium.interface.joints[number]
         normal = np.abs(rows[column_of("N", number)])
-        opened = rows[column_of("open_length", number)] > OPEN * own.joint_along
+        opened = rows[column_of("open_length", number)] > OPEN * joint_case.joint_along
         lifted = opened & (normal < UNLOADED * normal.max())
         landings = np.count_nonzero(lifted[:-1] & ~lifted[1:])
         if not landings:
@@ -158,24 +158,24 @@ def lift_offs(quake: Earthquake, rows: Table) -> list[str]:
         above = case.graph.separated([number])
         across = quake.system.translation(joint, above, joint.chord.normal)
         mass = float(across @ quake.system.mass @ across) / joint.width
-        period = 2 * math.pi * math.sqrt(mass / (own["K_N"] * own.joint_along))
+        period = 2 * math.pi * math.sqrt(mass / (joint_case["K_N"] * joint_case.joint_along))
         shortest = min(shortest, period)
         first, share = rows["time"][lifted][0], rows["dt"][lifted].sum() / rows["dt"].sum()
         where = case.named((number,)) or "the joint"
-        start = f"; {where}: " if said else f"what is above {where} lifts off and lands again, "
-        said.append(
+        start = f"; {where}: " if parts else f"what is above {where} lifts off and lands again, "
+        parts.append(
             f"{start}{landings} time{'s' if landings > 1 else ''} from t = {first:.3f} s on, "
             f"{share:.0%} of the time"
         )
-    if not said:
+    if not parts:
         return []
     text = (
-        f"{''.join(said)}: the contact is elastic, without damping of an impact but by "
+        f"{''.join(parts)}: the contact is elastic, without damping of an impact but by "
         "joint_damping_n"
     )
     if shortest < STEPS_OF_IMPACT * quake.dt:
         text += (
-            f"; the {'shortest ' * (len(said) > 1)}period of the contact (the mass above on K_N), "
+            f"; the {'shortest ' * (len(parts) > 1)}period of the contact (the mass above on K_N), "
             f"{shortest:.3g} s, has {shortest / quake.dt:.2g} steps, too few for its impacts, "
             "which may add energy: what follows is not reliable, accelerations least; compare "
             f"with dt = {shortest / STEPS_OF_IMPACT:.2g}"

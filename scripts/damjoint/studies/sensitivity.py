@@ -65,11 +65,10 @@ LIMIT_POINT = 1e-4
 #: All parameters that have a derivative and an effect, as the text of --sensitivity.
 ALL = "all"
 
-
 #: Column of a parameter's standard deviation among the changes.
 DEVIATION = "deviation"
 
-#: The same in `damjoint check`.
+#: As PRINTED, in `damjoint check`.
 PRINTED_OF_CHECKS = (
     *(("SSF", "-", 1.0), ("OSF", "-", 1.0)),
     *(("x_resultant", "m", 1.0), ("crack_end", "m", 1.0)),
