@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 from damjoint.input.resolve import load
+from damjoint.joint.interface import interface_of
+from damjoint.solver.path import SURE
 from damjoint.statics.hints import hints
 from damjoint.statics.statement import statement
 from damjoint.statics.verdict import verdict
 from damjoint.studies.critical import Search
+from damjoint.studies.failure_path import FailurePath
 
 #: 45 m dam with drains on a joint that cracks and slides slightly.
 DAM = {"E_dam": 2e10, "E_found": 3e10, "sigma_max": 1e5, "G_f": 100, "n_joint": 40}
@@ -115,3 +118,25 @@ def test_the_highest_level_of_a_run_does_not_depend_on_its_steps(solve, steps):
     assert one.stopped and several.stopped
     highest = one.history["level"].max()
     assert several.history["level"].max() == pytest.approx(highest, rel=1e-4)
+
+
+def test_a_path_whose_water_withdraws_again_at_the_same_place_ends():
+    """Once continued at a level above the highest one, the same increments would follow again."""
+    section = {"dam_height": 5.81, "dam_base": 4.40398, "dam_crest": 0.848, "n_joint": 40}
+    rock = {"found_side": 5.81, "found_depth": 5.81, "K_N": 4.02e11, "K_T": 3.46e11, "E": 3.28e10}
+    joint = {"law": "rupture", "sigma_max": 0, "alpha": 1, "uplift": "cracked", "weight_first": 1}
+    case = Search(load("dam", section | rock | joint, "4.65,4.94", "0"), "level").base
+    path = FailurePath(case, interface_of(case), case.highest_level)
+    path.verified = False
+    fill_on, times = path.fill_on, []
+
+    def counted():
+        times.append(path.top)
+        assert len(times) < 10  # else without end
+        fill_on()
+
+    path.fill_on = counted
+    path.follow(SURE)
+    assert len(times) > 1
+    assert path.leads_higher
+    assert path.water_withdraws

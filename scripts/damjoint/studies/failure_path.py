@@ -93,6 +93,8 @@ class FailurePath(EquilibriumPath):
         self.begun_by_run = False
         #: whether relaxation has reached a higher level from which no path leads on, see `fill_on`
         self.leads_higher = False
+        #: the equilibria from which the path has been continued so
+        self.filled_on: list[Point] = []
         #: the part of a joint that may open or soften before a displacement is prescribed
         self.most_softened = SOFTENED * rise / RISE
         #: whether the loads of a time are those of the last one, but for the level
@@ -284,8 +286,13 @@ class FailurePath(EquilibriumPath):
 
     def fill_on(self) -> None:
         """Continue from the highest level as filling does, which does not let the water out: by
-        relaxation at a level higher by the precision, if others follow that equilibrium.
+        relaxation at a level higher by the precision, if others follow that equilibrium; once from
+        each, as the same increments follow again.
         """
+        if any(self.points[self.top] is point for point in self.filled_on):
+            self.leads_higher = True
+            return
+        self.filled_on = [*self.filled_on, self.points[self.top]]
         other = self.copied()
         del other.points[self.top + 1 :]
         other.starts = [number for number in self.starts if number <= self.top]
