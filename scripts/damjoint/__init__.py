@@ -66,6 +66,13 @@ class InputError(ValueError):
     """
 
 
+def require(holds: object, name: str, value: float | str, rule: str) -> None:
+    """Raise InputError, "name = value: must rule", unless a condition holds."""
+    if not holds:
+        shown = value if isinstance(value, str) else f"{value:g}"
+        raise InputError(f"{name} = {shown}: must {rule}")
+
+
 class RunError(RuntimeError):
     """A computation failed, though not because of bad input.
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from .. import InputError
+from .. import InputError, require
 from ..laws import LAWS
 from .parameters import constants, declared
 from .values import (
@@ -102,25 +102,20 @@ def check_values(
         check_strain(case, case["dam_height"])
         check_section(case, section)
         for name in STAGED["traction"]:
-            if case[name]:
-                raise InputError(
-                    f"{name} = {case[name]:g}: must be 0 but with a geometry of one's own that has "
-                    "the region traction"
-                )
+            rule = "be 0 but with a geometry of one's own that has the region traction"
+            require(not case[name], name, case[name], rule)
         check_distances(case, section["joint_along"][0])
-    elif case["temperature_linear"]:
-        raise InputError(
-            f"temperature_linear = {case['temperature_linear']:g}: must be 0 with a geometry of "
-            "one's own (it is linear between the faces of the section)"
-        )
+    else:
+        linear, why = case["temperature_linear"], "it is linear between the faces of the section"
+        rule = f"be 0 with a geometry of one's own ({why})"
+        require(not linear, "temperature_linear", linear, rule)
     check_drains(case)
     check_time(case)
     check_works(case)
-    if not by_parameters and case["added_mass"] == ZANGAR:
-        raise InputError(
-            "added_mass = 2: must be 0 or 1 with a geometry of one's own (Zangar's pressure needs "
-            "the angle of the section's upstream face)"
-        )
+    if not by_parameters:
+        why = "Zangar's pressure needs the angle of the section's upstream face"
+        rule = f"be 0 or 1 with a geometry of one's own ({why})"
+        require(case["added_mass"] != ZANGAR, "added_mass", ZANGAR, rule)
     for violation in LAWS[case["law"]].violations(case.values):
         raise InputError(violation)
 
@@ -128,24 +123,20 @@ def check_values(
 def check_magnitudes(case: ParameterValues) -> None:
     """Values of materials and loads: at most LARGEST."""
     for name, largest in LARGEST.items():
-        if abs(case[name]) > largest:
-            unit = declared()[name].unit
-            raise InputError(
-                f"{name} = {case[name]:g}: must be between {-largest:g} and {largest:g} {unit}, "
-                "beyond any material or load"
-            )
+        limits = f"{-largest:g} and {largest:g} {declared()[name].unit}"
+        rule = f"be between {limits}, beyond any material or load"
+        require(abs(case[name]) <= largest, name, case[name], rule)
 
 
 def check_strain(case: ParameterValues, height: float) -> None:
     """Young's moduli: strain at most LARGEST_STRAIN under a column of concrete of a height [m]."""
     least = case["rho_dam"] * case["g"] * height / LARGEST_STRAIN
+    rule = (
+        f"be >= {least:.4g} Pa (rho_dam g H / {LARGEST_STRAIN:g}: a small strain under the weight "
+        f"of the dam, H = {height:g} m; a unit is a factor: 25*GPa)"
+    )
     for name in ("E_dam", "E_found"):
-        if case[name] < least:
-            raise InputError(
-                f"{name} = {case[name]:g}: must be >= {least:.4g} Pa (rho_dam g H / "
-                f"{LARGEST_STRAIN:g}: a small strain under the weight of the dam, H = {height:g} "
-                "m; a unit is a factor: 25*GPa)"
-            )
+        require(case[name] >= least, name, case[name], rule)
 
 
 def check_stiffness(
@@ -180,31 +171,25 @@ def check_stiffness(
     for name, factor, small in limits:
         needed = holds if name == "K_T" else carries
         least = [(">=", *small), (">=", *loosest)] if needed else []
+        unit = " Pa/m" if factor == 1 else ""
         for sign, bound, why in [*least, ("<=", *most)]:
-            if (case[name] * factor < bound) if sign == ">=" else (case[name] * factor > bound):
-                unit = " Pa/m" if factor == 1 else ""
-                raise InputError(
-                    f"{name} = {case[name]:g}: must be {sign} {bound / factor:.4g}{unit} ({why})"
-                )
+            stiffness, rule = case[name] * factor, f"be {sign} {bound / factor:.4g}{unit} ({why})"
+            within = stiffness >= bound if sign == ">=" else stiffness <= bound
+            require(within, name, case[name], rule)
 
 
 def check_energies(case: ParameterValues) -> None:
     """Fracture energies: larger than the elastic energy at the strength (no snap-back)."""
     for name, (least, formula) in LAWS[case["law"]].least_energies(case.values).items():
-        if not case[name] > least:
-            raise InputError(
-                f"{name} = {case[name]:g}: must be > {least:.4g} N/m ({formula}, what the joint "
-                "stores before it softens)"
-            )
+        why = f"{formula}, what the joint stores before it softens"
+        require(case[name] > least, name, case[name], f"be > {least:.4g} N/m ({why})")
 
 
 def check_softening(case: ParameterValues, twice: bool) -> None:
     """The softening of law = rupture: by G_f or pena_rupture, not both."""
-    if twice:
-        raise InputError(
-            f"G_f, pena_rupture = {case['G_f']:g}, {case['pena_rupture']:g}: must be one of them, "
-            "the other -1 (G_f = sigma_max^2 (1 + pena_rupture) / (2 K_N))"
-        )
+    given = f"{case['G_f']:g}, {case['pena_rupture']:g}"
+    formula = "G_f = sigma_max^2 (1 + pena_rupture) / (2 K_N)"
+    require(not twice, "G_f, pena_rupture", given, f"be one of them, the other -1 ({formula})")
 
 
 def check_lengths(case: ParameterValues) -> None:
@@ -214,14 +199,11 @@ def check_lengths(case: ParameterValues) -> None:
     names = ["dam_base", "dam_crest", "batter_height", "neck_height", "neck_batter", "joint_height"]
     names += ["found_side", "found_depth", *(["thickness"] if case["dim"] == 3 else [])]
     for name in names:
-        if 0 < case[name] < least:
-            raise InputError(f"{name} = {case[name]:g}: must be >= {least:g} m ({OF_HEIGHT})")
+        rule = f"be >= {least:g} m ({OF_HEIGHT})"
+        require(not 0 < case[name] < least, name, case[name], rule)
     for name in ("neck_height", "joint_height"):
-        if height - least < case[name] < height:
-            raise InputError(
-                f"{name} = {case[name]!r}: must be at least {least:g} m ({OF_HEIGHT}) below the "
-                f"crest ({height:g} m)"
-            )
+        rule = f"be at least {least:g} m ({OF_HEIGHT}) below the crest ({height:g} m)"
+        require(not height - least < case[name] < height, name, repr(case[name]), rule)
 
 
 #: LEAST_LENGTH in words.
@@ -238,21 +220,16 @@ def check_section(case: ParameterValues, section: Mapping[str, Sequence[float]])
         ("joint_height", "<", operator.lt),
         ("silt_height", "<=", operator.le),
     ):
-        if not holds(case[name], height):
-            raise InputError(f"{name} = {case[name]:g}: must be {sign} dam_height ({height:g} m)")
-    if not batter < base:
-        raise InputError(f"batter = {batter:g}: must be < dam_base ({base:g} m)")
-    widest = max(base - batter - case["dam_crest"], 0)
-    if case["neck_height"] and case["neck_batter"] > widest * (1 + 1e-12):
-        raise InputError(
-            f"neck_batter = {case['neck_batter']:g}: must be at most {widest:g} m "
-            "(dam_base - batter - dam_crest)"
-        )
-    if not (section["toe_x"][0] > section["heel_x"][0] and section["toe_y"][0] < height):
-        raise InputError(
-            f"joint_slope = {case['joint_slope']:g}: must let the joint leave the dam below its "
-            f"crest ({height:g} m)"
-        )
+        rule = f"be {sign} dam_height ({height:g} m)"
+        require(holds(case[name], height), name, case[name], rule)
+    require(batter < base, "batter", batter, f"be < dam_base ({base:g} m)")
+    widest, neck = max(base - batter - case["dam_crest"], 0), case["neck_batter"]
+    fits = not case["neck_height"] or neck <= widest * (1 + 1e-12)
+    rule = f"be at most {widest:g} m (dam_base - batter - dam_crest)"
+    require(fits, "neck_batter", neck, rule)
+    leaves = section["toe_x"][0] > section["heel_x"][0] and section["toe_y"][0] < height
+    rule = f"let the joint leave the dam below its crest ({height:g} m)"
+    require(leaves, "joint_slope", case["joint_slope"], rule)
     marks, regions = section["mark_region"], constants()
     for force, name, region, face in (
         ("ice_force", "ice_level", "ICE", "the upstream face"),
@@ -262,31 +239,29 @@ def check_section(case: ParameterValues, section: Mapping[str, Sequence[float]])
         ("drive", "drive_at", "POINT", f"the {case['drive_face']} face"),
     ):
         acts = has_point(case) if force == "drive" else case[force]
-        if acts and regions[region][0] not in marks:
-            raise InputError(f"{name} = {case[name]:g}: must lie on {face} of the dam")
-    simple = not (batter or case["neck_height"] or case["joint_height"] or marks)
-    if case["mesh_pattern"] == "regular" and not simple:
-        raise InputError(
-            "mesh_pattern = regular: must be free, layers or split for a section with batter, "
-            "neck, lift joint or line forces"
-        )
+        on_face = not acts or regions[region][0] in marks
+        require(on_face, name, case[name], f"lie on {face} of the dam")
+    if batter or case["neck_height"] or case["joint_height"] or marks:
+        check_pattern(case, "for a section with batter, neck, lift joint or line forces")
+
+
+def check_pattern(case: ParameterValues, condition: str) -> None:
+    """The pattern of the mesh in a section that the regular one does not suit, in words."""
+    rule = f"be free, layers or split {condition}"
+    require(case["mesh_pattern"] != "regular", "mesh_pattern", "regular", rule)
 
 
 def check_downstream_face(case: ParameterValues, face: Sequence[float]) -> None:
     """Corners of the downstream face between base and crest (x, y, x, y, ... [m]): upwards, and
     downstream of the upstream face.
     """
-    listed = f"downstream_face = {','.join(f'{v:g}' for v in face)}"
+    listed, neck = f"downstream_face = {in_list(face)}", case["neck_height"]
     height, batter = case["dam_height"], case["batter"]
     least = LEAST_LENGTH * height
-    if len(face) % 2:
-        raise InputError(f"{listed}: must be pairs x,y, for each corner its x and its height")
-    if case["neck_height"]:
-        raise InputError(f"neck_height = {case['neck_height']:g}: must be 0 with downstream_face")
-    if case["mesh_pattern"] == "regular":
-        raise InputError(
-            "mesh_pattern = regular: must be free, layers or split with downstream_face"
-        )
+    pairs = "be pairs x,y, for each corner its x and its height"
+    require(len(face) % 2 == 0, "downstream_face", in_list(face), pairs)
+    require(not neck, "neck_height", neck, "be 0 with downstream_face")
+    check_pattern(case, "with downstream_face")
     corners = downstream_corners(case, face)
     for (_, low), (_, high) in itertools.pairwise(corners):
         if not high - low >= least:
@@ -299,11 +274,10 @@ def check_downstream_face(case: ParameterValues, face: Sequence[float]) -> None:
     # the upstream face is straight between these heights, the other one between its corners
     for at in sorted({*y, case["batter_height"]} if batter else y):
         upstream = batter * min(max(at, 0.0) / case["batter_height"], 1.0)
-        if not np.interp(at, y, x) - upstream >= least:
-            raise InputError(
-                f"{listed}: must lie downstream of the upstream face, at x > {upstream:g} m at a "
-                f"height of {at:g} m"
-            )
+        where = f"at x > {upstream:g} m at a height of {at:g} m"
+        rule = f"lie downstream of the upstream face, {where}"
+        holds = bool(np.interp(at, y, x) - upstream >= least)
+        require(holds, "downstream_face", in_list(face), rule)
 
 
 def downstream_corners(case: ParameterValues, face: Sequence[float]) -> list[tuple[float, float]]:
@@ -328,9 +302,8 @@ def check_joints_on_face(
             side = (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)  # > 0: above the line
             near = LEAST_LENGTH * case["dam_height"]
             if abs(y - y1) > near and (y > y1) != (side > near * (x1 - x0)):
-                listed = ",".join(f"{v:g}" for v in face)
                 raise InputError(
-                    f"downstream_face = {listed}: its corner at ({x:g}, {y:g}) must be "
+                    f"downstream_face = {in_list(face)}: its corner at ({x:g}, {y:g}) must be "
                     f"{'above' if y > y1 else 'below'} the line of the joint from ({x0:g}, {y0:g}) "
                     f"to ({x1:g}, {y1:g})"
                 )
@@ -338,18 +311,13 @@ def check_joints_on_face(
 
 def check_lift_heights(heights: Sequence[float], height: float) -> None:
     """Heights of the joints above the first one [m]: within the dam, of a height [m]."""
-    listed = ",".join(f"{h:g}" for h in heights)
-    least = LEAST_LENGTH * height
+    least, listed = LEAST_LENGTH * height, f"lift_heights = {in_list(heights)}: each must be"
     for lift in heights:
         if not 0 < lift < height:
-            raise InputError(
-                f"lift_heights = {listed}: each must be > 0 and < dam_height ({height:g} m)"
-            )
+            raise InputError(f"{listed} > 0 and < dam_height ({height:g} m)")
         if not least <= lift <= height - least:
-            raise InputError(
-                f"lift_heights = {listed}: each must be at least {least:g} m ({OF_HEIGHT}) above "
-                "the base and below the crest"
-            )
+            where = "above the base and below the crest"
+            raise InputError(f"{listed} at least {least:g} m ({OF_HEIGHT}) {where}")
 
 
 def check_lifts(
@@ -358,80 +326,68 @@ def check_lifts(
     sections: Sequence[Mapping[str, Sequence[float]]],
 ) -> None:
     """Heights of the joints above the first one [m]; sections: of each joint, from the lowest."""
-    listed = ",".join(f"{h:g}" for h in heights)
-    if case["mesh_pattern"] == "regular":
-        raise InputError("mesh_pattern = regular: must be free, layers or split with lift_heights")
+    check_pattern(case, "with lift_heights")
     for lower, upper in itertools.pairwise(sections):
         for end in ("heel", "toe"):
             low, high = (section[f"{end}_y"][0] for section in (lower, upper))
-            if not high - low >= LEAST_LENGTH * case["dam_height"]:
-                raise InputError(
-                    f"lift_heights = {listed}: must increase from above the first joint; the {end} "
-                    f"of a joint, at {high:g} m, is not above that of the one below it, {low:g} m"
-                )
+            rule = (
+                f"increase from above the first joint; the {end} of a joint, at {high:g} m, is "
+                f"not above that of the one below it, {low:g} m"
+            )
+            above = high - low >= LEAST_LENGTH * case["dam_height"]
+            require(above, "lift_heights", in_list(heights), rule)
 
 
 def check_distances(case: ParameterValues, length: float) -> None:
     """Distances of drains and waterstop from the heel: within the length of the joint [m]."""
     present = {"drain_x": has_drains(case), "waterstop": case["uplift"] == "waterstop"}
     for name in present:
-        if present[name] and not case[name] < length:
-            raise InputError(
-                f"{name} = {case[name]:g}: must be < the joint's length ({length:g} m)"
-            )
+        within = not present[name] or case[name] < length
+        require(within, name, case[name], f"be < the joint's length ({length:g} m)")
 
 
 def check_drains(case: ParameterValues) -> None:
     """Drains: with a prescribed displacement their pressure has to be linear in the level."""
-    level, drive = case["drain_level"], case["drive"]
-    if has_drains(case) and not flows(case) and level_unknown(case) and level > 0:
-        raise InputError(
-            f"drain_level = {level:g}: must be 0 with drive = {drive} "
-            "(the pressure has to be linear in the level)"
-        )
+    if has_drains(case) and not flows(case) and level_unknown(case):
+        rule = f"be 0 with drive = {case['drive']} (the pressure has to be linear in the level)"
+        require(case["drain_level"] <= 0, "drain_level", case["drain_level"], rule)
 
 
 def check_time(case: ParameterValues) -> None:
     """Flow in time: of uplift = flow, without a pseudo-static earthquake."""
+    pseudo_static = bool(case["k_h"] or case["k_v"])
+    timeless = "with k_h or k_v (a pseudo-static earthquake has no time)"
     if case["quake_uplift"] == "transient":
-        if case["k_h"] or case["k_v"]:
-            raise InputError(
-                "quake_uplift = transient: must be crack, unchanged or zero with k_h or k_v (a "
-                "pseudo-static earthquake has no time)"
-            )
-        if case["uplift"] == "cracked":
-            raise InputError("quake_uplift = transient: must be another with uplift = cracked")
-    if case["uplift"] == "flow" and case["storage"] * case["rho_water"] * case["g"] > 1:
-        raise InputError(
-            f"storage = {case['storage']:g}: must be at most 1 / (rho_water g) (a metre of head "
-            "would store more than a metre of water)"
-        )
-    if not flows_in_time(case):
-        return
-    unit = f"time_unit = {case['time_unit']:g}: must be 0"
-    if case["uplift"] == "cracked":
-        raise InputError(f"{unit} with uplift = cracked (its water does not need time)")
-    if case["k_h"] or case["k_v"]:
-        raise InputError(f"{unit} with k_h or k_v (a pseudo-static earthquake has no time)")
+        rule = f"be crack, unchanged or zero {timeless}"
+        require(not pseudo_static, "quake_uplift", "transient", rule)
+        rule = "be another with uplift = cracked"
+        require(case["uplift"] != "cracked", "quake_uplift", "transient", rule)
+    if case["uplift"] == "flow":
+        stores, why = case["storage"], "a metre of head would store more than a metre of water"
+        rule = f"be at most 1 / (rho_water g) ({why})"
+        require(stores * case["rho_water"] * case["g"] <= 1, "storage", stores, rule)
+    if flows_in_time(case):
+        unit, rule = case["time_unit"], "be 0 with uplift = cracked (its water does not need time)"
+        require(case["uplift"] != "cracked", "time_unit", unit, rule)
+        require(not pseudo_static, "time_unit", unit, f"be 0 {timeless}")
 
 
 def check_works(case: ParameterValues) -> None:
     """Grouting and sawing: of laws and uplifts that include them."""
     included = () if flows(case) else LAWS[case["law"]].works
     for name in ("grout_pressure", "saw_thickness"):
-        if case[name] > 0 and name not in included:
-            laws = " or ".join(law for law, rules in LAWS.items() if name in rules.works)
-            raise InputError(
-                f"{name} = {case[name]:g}: must be 0 with law = {case['law']}, uplift = "
-                f"{case['uplift']} (only law = {laws} includes it, with uplift = none, imposed, "
-                "drained or waterstop)"
-            )
+        laws = " or ".join(law for law, rules in LAWS.items() if name in rules.works)
+        rule = (
+            f"be 0 with law = {case['law']}, uplift = {case['uplift']} (only law = {laws} includes "
+            "it, with uplift = none, imposed, drained or waterstop)"
+        )
+        require(case[name] <= 0 or name in included, name, case[name], rule)
 
 
 def check_steps(steps: int) -> None:
     """Number of steps between two levels."""
-    if not 1 <= steps <= MOST_STEPS:
-        raise InputError(f"steps = {steps}: must be an integer >= 1 and <= {MOST_STEPS}")
+    rule = f"be an integer >= 1 and <= {MOST_STEPS}"
+    require(1 <= steps <= MOST_STEPS, "steps", str(steps), rule)
 
 
 def highest_level(case: ParameterValues) -> float:
@@ -441,14 +397,12 @@ def highest_level(case: ParameterValues) -> float:
 
 def check_levels(name: str, levels: Sequence[float], highest: float) -> None:
     """Water levels [m] from 0 to `highest`; above the crest the dam is overtopped."""
-    if len(levels) > MOST_LEVELS:
-        raise InputError(f"{name} = {len(levels)} values: must be at most {MOST_LEVELS}")
+    most = f"be at most {MOST_LEVELS}"
+    require(len(levels) <= MOST_LEVELS, name, f"{len(levels)} values", most)
+    limit = f"between 0 and {highest:g} m, twice the dam's height"
+    rule = f"be {limit if highest < math.inf else '>= 0'}"
     for level in levels:
-        if not 0 <= level <= highest:
-            limit = f"between 0 and {highest:g} m, twice the dam's height"
-            raise InputError(
-                f"{name} = {level:g}: must be {limit if highest < math.inf else '>= 0'}"
-            )
+        require(0 <= level <= highest, name, level, rule)
 
 
 def check_levels_on_mesh(name: str, levels: Sequence[float], low: float, high: float) -> None:
@@ -456,12 +410,12 @@ def check_levels_on_mesh(name: str, levels: Sequence[float], low: float, high: f
     most twice its height above its lowest point. (Infinite: the search of a critical level.)
     """
     limit = low + constants()["highest_level"][0] * (high - low)
+    rule = (
+        f"be at most {limit:g} m, twice the dam's height above its lowest point (the geometry's "
+        f"dam is from y = {low:g} to {high:g} m)"
+    )
     for level in levels:
-        if limit < level < math.inf:
-            raise InputError(
-                f"{name} = {level:g}: must be at most {limit:g} m, twice the dam's height above "
-                f"its lowest point (the geometry's dam is from y = {low:g} to {high:g} m)"
-            )
+        require(not limit < level < math.inf, name, level, rule)
 
 
 def check_acting(case: ParameterValues, end: float) -> None:
@@ -478,28 +432,19 @@ def check_acting(case: ParameterValues, end: float) -> None:
 
 def check_tail_levels(tails: Sequence[float], number: int, of_case: bool) -> None:
     """Tailwater levels: as many as levels; of_case: whether they are those of the case file."""
-    if len(tails) != number:
-        listed = ",".join(f"{v:g}" for v in tails)
-        whose = " (the case's own; set --tail-levels)" if of_case else ""
-        raise InputError(
-            f"tail_levels = {listed}{whose}: must be one level or as many as levels ({number})"
-        )
+    given = in_list(tails) + (" (the case's own; set --tail-levels)" if of_case else "")
+    rule = f"be one level or as many as levels ({number})"
+    require(len(tails) == number, "tail_levels", given, rule)
 
 
 def check_times(times: Sequence[float], last: int) -> None:
     """Times of the steps: increasing from above 0 to the last level's interval."""
-    listed = ",".join(f"{t:g}" for t in times)
-    for before, time in zip((0.0, *times), times, strict=False):
-        if not before < time <= last:
-            raise InputError(
-                f"times = {listed}: must increase from above 0 to at most {last} (level number i "
-                "is reached at t = i)"
-            )
-    if times[-1] <= last - 1:
-        raise InputError(
-            f"times = {listed}: must end after {last - 1}, on the way to the last level (reached "
-            f"at t = {last})"
-        )
+    listed = in_list(times)
+    rises = all(before < time <= last for before, time in itertools.pairwise((0.0, *times)))
+    rule = f"increase from above 0 to at most {last} (level number i is reached at t = i)"
+    require(rises, "times", listed, rule)
+    rule = f"end after {last - 1}, on the way to the last level (reached at t = {last})"
+    require(times[-1] > last - 1, "times", listed, rule)
 
 
 def check_drive(case: ParameterValues, last: int) -> None:
@@ -508,31 +453,28 @@ def check_drive(case: ParameterValues, last: int) -> None:
     """
     begin, end, load = case["drive_begin"], case["drive_end"], case["drive_load"]
     if case["drive"] == "dissipation":
-        if load not in ("force", "traction"):
-            raise InputError(f"drive_load = {load}: must be force or traction with dissipation")
-        if not case["drive_energy"]:
-            raise InputError("drive_energy = 0: must be > 0 N m per m with drive = dissipation")
+        rule = "be force or traction with dissipation"
+        require(load in ("force", "traction"), "drive_load", load, rule)
+        rule = "be > 0 N m per m with drive = dissipation"
+        require(case["drive_energy"], "drive_energy", 0, rule)
     if load != "level":
         sizes = STAGED[load]
-        if not any(case[name] for name in sizes):
-            raise InputError(
-                f"drive_load = {load}: must be level, or {' or '.join(sizes)} not 0 (the load "
-                "whose factor is unknown)"
-            )
-        if end != last:
-            raise InputError(f"drive_end = {end:g}: must be {last} (the last t) with drive_load")
-    if not 0 <= begin < end <= last:
-        raise InputError(
-            f"drive_begin, drive_end = {begin:g}, {end:g}: must be "
-            f"0 <= drive_begin < drive_end <= {last} (the last t)"
-        )
+        acts = any(case[name] for name in sizes)
+        unknown = "the load whose factor is unknown"
+        require(acts, "drive_load", load, f"be level, or {' or '.join(sizes)} not 0 ({unknown})")
+        require(end == last, "drive_end", end, f"be {last} (the last t) with drive_load")
+    rule = f"be 0 <= drive_begin < drive_end <= {last} (the last t)"
+    require(0 <= begin < end <= last, "drive_begin, drive_end", f"{begin:g}, {end:g}", rule)
 
 
 def check_also_uplift(modes: Sequence[str], uplift: str) -> None:
     """Further uplift modes of a published case: each once."""
     for mode in modes:
         declared()["uplift"].check(mode)
-    if len({uplift, *modes}) <= len(modes):
-        raise InputError(
-            f"also_uplift = {' '.join(modes)}: must be other modes than uplift, each once"
-        )
+    once = len({uplift, *modes}) > len(modes)
+    require(once, "also_uplift", " ".join(modes), "be other modes than uplift, each once")
+
+
+def in_list(values: Sequence[float]) -> str:
+    """Values as they are typed in an option."""
+    return ",".join(f"{value:g}" for value in values)
