@@ -209,15 +209,18 @@ def results_page() -> str:
         "the series, `residual`: their difference over the standard deviation.",
         "## fields/",
         "`bulk.msh` and `joint.msh` for Gmsh (a view per field with all levels as its steps); "
-        "`fields.pvd` for ParaView, with the blocks bodies (`bulk_t*.vtu`) and joints "
-        "(`joint_t*.vtu`); with order 2 of the condensed engine the cells are quadratic, with the "
-        "displacement at their midpoints. Arrays have their unit in their name; `level [m]` is a "
-        "value of each file. Bodies: `displacement [m]`, `stress [Pa]` (xx, yy, zz, xy, yz, xz), "
+        "`fields.pvd` for ParaView, with a block for each body and joint, which has its name "
+        "(`dam above lift 12 m`, `joint lift 12 m`; files `dam_2_t*.vtu`, `joint_2_t*.vtu`). The "
+        "time that ParaView shows is the reservoir level, where it rises from each level to the "
+        "next and `time_unit` is 0; else the time of the run, of an earthquake [s]. With order 2 "
+        "of the condensed engine the cells are quadratic, with the displacement at their "
+        "midpoints. Arrays have their unit in their name; `level [m]` is a value of each file. "
+        "Bodies: `displacement [m]`, `stress [Pa]` (xx, yy, zz, xy, yz, xz), "
         "`largest principal stress [Pa]`, `smallest principal stress [Pa]` (tension > 0), "
         "`body` (1 dam, 2 foundation, 1001 dam 2, ...). Joints: "
-        "`displacement [m]` of the body below, so that Warp By Vector moves both "
-        "blocks; `opening [m]`, never negative; `jump [m]` and `traction [Pa]` along x, "
-        "y, z, the columns of joint.csv, and `joint`, its number.",
+        "`displacement [m]` of the body below, so that Warp By Vector moves them "
+        "together; `opening [m]`, never negative; `jump [m]` and `traction [Pa]` along x, "
+        "y, z, and the columns of joint.csv.",
     ]
     return "\n\n".join(parts) + "\n"
 

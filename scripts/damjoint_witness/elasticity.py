@@ -1,10 +1,10 @@
 """Displacement jumps of the bodies, by scikit-fem, under their loads and the joints' tractions.
 
-Each body of the mesh in fields/bulk_t*.vtu is loaded by its weight, water and silt on its faces,
-forces on lines, temperature, and by the tractions at the integration points in steps.csv with the
-water in the joints. The displacements of a body above a joint are known up to a rigid motion: those
-that fit the jumps best are added. Then the difference of the displacements on both sides of a joint
-is its written jump.
+Each body of the mesh, from its file in fields/, is loaded by its weight, water and silt on its
+faces, forces on lines, temperature, and by the tractions at the integration points in steps.csv
+with the water in the joints. The displacements of a body above a joint are known up to a rigid
+motion: those that fit the jumps best are added. Then the difference of the displacements on both
+sides of a joint is its written jump.
 """
 
 from __future__ import annotations
@@ -774,9 +774,8 @@ def wet_parts(corners: Array, beyond: Array) -> list[Array]:
 
 def violations(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
     """Yield where the jumps differ from those of the bodies under their loads and the tractions."""
-    path = next((files.folder / "fields").glob("bulk_t*.vtu"))
     names = [(j["upper"], j["lower"]) for j in files.record["joints"]] or [("dam", "foundation")]
-    dam = Dam(asked, read_solids(path), tuple(names))
+    dam = Dam(asked, read_solids(files.folder / "fields"), tuple(names))
     in_time = heads_in_time(files, asked, steps)
     for update, states in joint_states(files, asked, steps):
         own = rows_where(steps, steps["update"] == update)

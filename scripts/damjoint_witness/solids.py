@@ -228,25 +228,24 @@ def corners_of(block: Any) -> tuple[str, IntArray]:
     return shape, block.data[:, : NUMBER_OF_CORNERS[shape]]
 
 
-def read_solids(path: Path) -> dict[str, Solid]:
-    """Read the bodies of a file bulk_t*.vtu by name."""
-    mesh: Any = meshio.read(path)
-    parts: dict[str, list[tuple[str, IntArray, int]]] = {}
-    for block, regions in zip(mesh.cells, mesh.cell_data["body"], strict=True):
-        shape, table = corners_of(block)
-        if shape == "wedge":
-            table = table[:, FROM_VTK_WEDGE]
-        for region in np.unique(regions).tolist():
-            of_region = table[regions == region]
-            parts.setdefault(body_name(region), []).append((shape, of_region, region))
+def read_solids(folder: Path) -> dict[str, Solid]:
+    """Read the bodies of a folder fields/ by name, from the files of one time."""
+    end = next(folder.glob("foundation_t*.vtu")).name.removeprefix("foundation")
     solids = {}
-    for name, cells in parts.items():
+    for path in (p for part in ("foundation", "dam", "dam_*") for p in folder.glob(part + end)):
+        mesh: Any = meshio.read(path)
+        cells: list[tuple[str, IntArray, int]] = []
+        for block, regions in zip(mesh.cells, mesh.cell_data["body"], strict=True):
+            shape, table = corners_of(block)
+            if shape == "wedge":
+                table = table[:, FROM_VTK_WEDGE]
+            cells += [(shape, table[regions == r], r) for r in np.unique(regions).tolist()]
         used, numbers = np.unique(
             np.concatenate([t.ravel() for _, t, _ in cells]), return_inverse=True
         )
         ends = np.cumsum([t.size for _, t, _ in cells])[:-1]
         tables = zip(cells, np.split(numbers.ravel(), ends), strict=True)
-        solids[name] = Solid(
+        solids[body_name(cells[0][2])] = Solid(
             mesh.points[used], tuple((s, own.reshape(t.shape), r) for (s, t, r), own in tables)
         )
     return solids

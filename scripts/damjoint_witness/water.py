@@ -181,19 +181,17 @@ def joint_rule(shape: str, order: int, quadrature: str) -> tuple[Array, Array]:
 
 def sides_of(files: Files, asked: Asked, number: int, rows: Table) -> tuple[Sides, ...]:
     """Return the elements of a joint: in 2D between its nodes along it, in 3D those of the file
-    fields/joint_t*.vtu.
+    fields/joint_t*.vtu, joint_2_t*.vtu, ...
     """
     order = int(asked.joints[0]["order"])
     if asked.joints[0]["dim"] == 2:
         by_s = np.argsort(rows["s"])[::order]
         corners = np.column_stack([rows[name][by_s] for name in "xyz"])
         return (Sides("line", np.stack([corners[:-1], corners[1:]], axis=1), order),)
-    path = next((files.folder / "fields").glob("joint_t*.vtu"))
-    mesh: Any = meshio.read(path)
-    own = mesh.point_data["joint"] == number + 1
-    blocks = [corners_of(block)[1] for block in mesh.cells]
-    tables = [block[own[block].all(axis=1)] for block in blocks]
-    return tuple(Sides(SHAPES[t.shape[1]], mesh.points[t], order) for t in tables if len(t))
+    name = f"joint_{number + 1}_t*.vtu" if number else "joint_t*.vtu"
+    mesh: Any = meshio.read(next((files.folder / "fields").glob(name)))
+    tables = [corners_of(block)[1] for block in mesh.cells]
+    return tuple(Sides(SHAPES[t.shape[1]], mesh.points[t], order) for t in tables)
 
 
 # -- heads

@@ -7,6 +7,7 @@ import json
 import shutil
 import subprocess
 import sys
+from xml.etree import ElementTree
 
 import meshio
 import numpy as np
@@ -128,43 +129,69 @@ def test_files_of_a_run(folder):
     assert next(folder.glob("*.png")).read_bytes()[:4] == b"\x89PNG"
 
 
+def collection(fields):
+    """Files of fields.pvd by the time and the name of the block that ParaView shows."""
+    entries = ElementTree.parse(fields / "fields.pvd").iter("DataSet")
+    return {(float(e.get("timestep")), e.get("name")): fields / e.get("file") for e in entries}
+
+
 def test_fields_for_paraview(folder):
-    """A file per level: crest displacement as in history.csv, none at the bottom; jumps as in
-    joint.csv.
+    """A time per level, which is the level; crest displacement as in history.csv, none at the
+    bottom; jumps as in joint.csv.
     """
-    fields = folder / "fields"
-    assert (
-        "bulk_t1.vtu" in (fields / "fields.pvd").read_text()
-        and "joint_t2.vtu" in (fields / "fields.pvd").read_text()
-    )
+    shown = collection(folder / "fields")
+    names = "dam", "foundation", "joint"
+    assert {*shown} == {(level, name) for level in (6, 9) for name in names}
     joint, history = read(folder / "joint.csv"), read(folder / "history.csv")
-    for time in (1, 2):
-        bulk, lips = (meshio.read(fields / f"{name}_t{time}.vtu") for name in ("bulk", "joint"))
-        moved, bottom = bulk.point_data["displacement [m]"], np.isclose(bulk.points[:, 1], -5)
-        crest = np.all(np.isclose(bulk.points, (0, 10, 0)), axis=1)
-        assert_allclose(moved[crest, 0], history["crest_ux"][history["time"] == time], rtol=1e-6)
-        assert_allclose(moved[bottom], 0, atol=1e-15)
+    for level in (6, 9):
+        dam, rock, lips = (meshio.read(shown[level, name]) for name in names)
+        moved, lowest = (mesh.point_data["displacement [m]"] for mesh in (dam, rock))
+        crest = np.all(np.isclose(dam.points, (0, 10, 0)), axis=1)
+        at_level = history["level"] == level
+        assert_allclose(moved[crest, 0], history["crest_ux"][at_level], rtol=1e-6)
+        assert_allclose(lowest[np.isclose(rock.points[:, 1], -5)], 0, atol=1e-15)
         assert_allclose(
             np.sort(lips.point_data["jump [m]"][:, 1]),
-            np.sort(joint["delta_n"][joint["time"] == time]),
+            np.sort(joint["delta_n"][joint["level"] == level]),
             rtol=1e-6,
         )
-        assert bulk.cell_data["stress [Pa]"][0].shape == (918, 6)
-        top = joint["level"][joint["time"] == time][0]
-        for block in ("bodies", "joints"):
-            assert f'timestep="{time}.0" name="{block}"' in (fields / "fields.pvd").read_text()
-        assert bulk.field_data["level [m]"] == lips.field_data["level [m]"] == top
-        largest, smallest = (
-            bulk.cell_data[f"{which} principal stress [Pa]"][0] for which in ("largest", "smallest")
-        )
-        xx, yy, zz, xy, _, _ = bulk.cell_data["stress [Pa]"][0].T
-        middle, radius = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
-        assert_allclose(largest, np.maximum(middle + radius, zz), atol=1e-6 * np.abs(yy).max())
-        assert_allclose(smallest, np.minimum(middle - radius, zz), atol=1e-6 * np.abs(yy).max())
+        assert len(dam.cells[0].data) + len(rock.cells[0].data) == 918
+        assert {m.field_data["level [m]"].item() for m in (dam, rock, lips)} == {level}
         jump = lips.point_data["jump [m]"][:, 1]
         assert_allclose(lips.point_data["opening [m]"], np.maximum(jump, 0))
-        right = bulk.points[bulk.cells[0].data].mean(axis=1)[:, 1] > 0
-        assert np.array_equal(bulk.cell_data["body"][0] == 1, right)  # 1 dam, 2 foundation
+        for mesh, number in ((dam, 1), (rock, 2)):
+            (stress,) = mesh.cell_data["stress [Pa]"]
+            largest, smallest = (
+                mesh.cell_data[f"{which} principal stress [Pa]"][0]
+                for which in ("largest", "smallest")
+            )
+            xx, yy, zz, xy, _, _ = stress.T
+            middle, radius = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+            assert_allclose(largest, np.maximum(middle + radius, zz), atol=1e-6 * np.abs(yy).max())
+            assert_allclose(smallest, np.minimum(middle - radius, zz), atol=1e-6 * np.abs(yy).max())
+            assert np.all(mesh.cell_data["body"][0] == number)
+
+
+def test_blocks_for_paraview_have_the_names_of_joints_and_times_are_levels_that_rise(
+    command, tmp_path
+):
+    """A level that falls, or water that needs time: the time of the run."""
+    small = "--set", "n_joint=10", "--set", "h_dam=30", "--set", "h_found=30", "--no-picture"
+    fields = tmp_path / "out" / "dam" / "fields"
+    assert (
+        command("run", "dam", *small, "--set", "lift_heights=10,20.5", "--levels", "20,25")[0] == 0
+    )
+    bodies = "foundation", "dam above base", "dam above lift 10 m", "dam above lift 20.5 m"
+    joints = "joint base", "joint lift 10 m", "joint lift 20.5 m"
+    assert [*collection(fields)] == [(t, name) for t in (20, 25) for name in bodies + joints]
+    highest, lift = (meshio.read(collection(fields)[25, n]) for n in (bodies[-1], joints[-1]))
+    assert lift.points[:, 1] == pytest.approx(20.5) and highest.points[:, 1].min() == 20.5
+    for levels in ("25,20", "20,20"):
+        assert command("run", "dam", *small, "--levels", levels)[0] == 0
+        assert {time for time, _ in collection(fields)} == {1, 2}
+    flow = "--set", "uplift=flow", "--set", "time_unit=3600"
+    assert command("run", "dam", *small, *flow, "--levels", "20,25")[0] == 0
+    assert {time for time, _ in collection(fields)} == {1, 2}
 
 
 @pytest.mark.parametrize("engine", ["condensed", "getdp"])
@@ -175,18 +202,19 @@ def test_the_points_of_each_joint_move_with_the_body_below_it(command, tmp_path,
     # else displacements count from the state under the weight, jumps from none
     assert command("run", "dam", *settings, *lifts, "--set", "weight_first=0")[0] == 0
     fields = tmp_path / "out" / "dam" / "fields"
-    bulk, lips = (meshio.read(fields / f"{name}_t1.vtu") for name in ("bulk", "joint"))
-    (table,), (regions,) = (block.data for block in bulk.cells), bulk.cell_data["body"]
-    names = "displacement [m]", "jump [m]"
-    moved, (at_joint, jump) = bulk.point_data[names[0]], (lips.point_data[n] for n in names)
-    for joint, lower, upper in ((1, 2, 1), (2, 1, 1001), (3, 1001, 2001)):
-        on = lips.point_data["joint"] == joint
-        for body, expected in ((lower, at_joint[on]), (upper, at_joint[on] + jump[on])):
-            nodes = np.unique(table[regions == body])
-            away = np.abs(bulk.points[nodes][:, None] - lips.points[on]).max(axis=2)
+    parts = {path.stem.removesuffix("_t1"): meshio.read(path) for path in fields.glob("*.vtu")}
+    for joint, lower, upper in (
+        *(("joint", "foundation", "dam"), ("joint_2", "dam", "dam_2")),
+        ("joint_3", "dam_2", "dam_3"),
+    ):
+        lips = parts[joint]
+        at_joint, jump = (lips.point_data[n] for n in ("displacement [m]", "jump [m]"))
+        for body, expected in ((lower, at_joint), (upper, at_joint + jump)):
+            away = np.abs(parts[body].points[:, None] - lips.points).max(axis=2)
             assert away.min(axis=0).max() == 0
-            assert_allclose(moved[nodes[away.argmin(axis=0)]], expected, atol=1e-9)
-        assert np.abs(at_joint[on]).max() > 1e-4
+            moved = parts[body].point_data["displacement [m]"]
+            assert_allclose(moved[away.argmin(axis=0)], expected, atol=1e-9)
+        assert np.abs(at_joint).max() > 1e-4
 
 
 def test_cells_of_order_2_have_their_midpoints(command, tmp_path):
@@ -196,15 +224,15 @@ def test_cells_of_order_2_have_their_midpoints(command, tmp_path):
     small = "--set", "n_joint=10", "--set", "h_dam=20", "--set", "h_found=30"
     assert command("run", "dam", *small, "--levels", "30", "--no-picture")[0] == 0
     folder = tmp_path / "out/dam/fields"
-    bulk, lips = (meshio.read(folder / f"{name}_t1.vtu") for name in ("bulk", "joint"))
-    assert [block.type for block in bulk.cells] == ["triangle6"]
+    dam, lips = (meshio.read(folder / f"{name}_t1.vtu") for name in ("dam", "joint"))
+    assert [block.type for block in dam.cells] == ["triangle6"]
     assert [block.type for block in lips.cells] == ["line3"]
     joint = read(tmp_path / "out/dam/joint.csv")
     order = np.argsort(lips.points[:, 0])
     assert_allclose(lips.points[order, 0], joint["x"], atol=1e-9)
     assert_allclose(lips.point_data["jump [m]"][order, 1], joint["delta_n"], rtol=1e-9)
-    (table,) = (block.data for block in bulk.cells)
-    corners, moved = bulk.points[table], bulk.point_data["displacement [m]"][table]
+    (table,) = (block.data for block in dam.cells)
+    corners, moved = dam.points[table], dam.point_data["displacement [m]"][table]
     for k, (a, b) in enumerate(((0, 1), (1, 2), (2, 0)), 3):
         assert_allclose(corners[:, k], (corners[:, a] + corners[:, b]) / 2, atol=1e-9)
         bent = moved[:, k] - (moved[:, a] + moved[:, b]) / 2
@@ -287,9 +315,9 @@ def test_flux_in_the_fields(command, tmp_path):
 
 def test_vertical_stress_in_the_dam_balances_its_weight(folder):
     """At 6 m, over the elements that a horizontal section cuts near the crest: the weight above."""
-    bulk = meshio.read(folder / "none" / "fields" / "bulk_t1.vtu")
-    cells, stress = bulk.cells[0].data, bulk.cell_data["stress [Pa]"][0]
-    middle = bulk.points[cells].mean(axis=1)
+    dam = meshio.read(folder / "none" / "fields" / "dam_t1.vtu")
+    cells, stress = dam.cells[0].data, dam.cell_data["stress [Pa]"][0]
+    middle = dam.points[cells].mean(axis=1)
     high = np.abs(middle[:, 1] - 8) < 1
     above = (
         2400 * 9.81 * (10 - middle[high, 1]) * (1.5 + 0.35 * (10 - middle[high, 1]) / 2)

@@ -257,7 +257,7 @@ def test_a_run_loads_neither_meshio_nor_the_plotting_library(tmp_path):
     tell += "; print([m for m in ('meshio', 'matplotlib') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", tell], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
-    assert (tmp_path / "out" / "c.png").exists() and (tmp_path / "out/fields/bulk_t1.vtu").exists()
+    assert (tmp_path / "out" / "c.png").exists() and (tmp_path / "out/fields/dam_t1.vtu").exists()
 
 
 @pytest.mark.parametrize("name", ["flow", "k"])

@@ -110,7 +110,7 @@ def damaged(folder, name, text):
     [
         (lambda f: (f / "run.json").unlink(), "must be the folder of a run"),
         (lambda f: damaged(f, "joint.csv", "x,y\n1\n"), "damaged"),
-        (lambda f: damaged(f, "fields/bulk_t2.vtu", "<VTKFile"), "damaged"),
+        (lambda f: damaged(f, "fields/dam_t2.vtu", "<VTKFile"), "damaged"),
         (lambda f: change(f, parameters={}), "lacks parameters"),
         (lambda f: change(f, case="../../elsewhere"), "must be the name of a case"),
     ],

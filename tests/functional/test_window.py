@@ -786,7 +786,7 @@ def test_an_earthquake_follows_the_static_loads(open_window, command, tmp_path):
     for name in ("quake.csv", "joint.csv", "history.csv"):
         one, other = ((tmp_path / f / name).read_bytes() for f in ("window", "again"))
         assert one == other
-    assert (tmp_path / "window" / "fields" / "bulk_t0.2.vtu").exists()
+    assert (tmp_path / "window" / "fields" / "dam_t0.2.vtu").exists()
 
 
 @pytest.mark.heavy

@@ -7,12 +7,14 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from ..arrays import Table
 from ..fem import elements
 from ..input.parameters import constants, start_gmsh
+from ..input.scene import numbered
 from ..mesh.body import Body
 from ..model.fields import OF_JOINT, Field, Solution, joint_body, joint_data
 from ..storage import atomic_write
@@ -43,8 +45,6 @@ VTK_TYPES |= {shape: number for shape, (number, _) in QUADRATIC.items()}
 #: Components xx, xy, xz, yx, ... of a Gmsh tensor among those of `Field.stress`.
 TENSOR = [0, 3, 5, 3, 1, 4, 5, 4, 2]
 
-#: Names of the blocks in ParaView, by those of the files.
-BLOCKS = {"bulk": "bodies", "joint": "joints"}
 #: Names of fields with their units; the level is a value of the whole file.
 DISPLACEMENT, STRESS, LEVEL = "displacement [m]", "stress [Pa]", "level [m]"
 
@@ -54,8 +54,8 @@ View = tuple[str, str, dict[float, np.ndarray]]
 
 
 def write_fields(solution: Solution, folder: Path) -> None:
-    """Write the fields of a solution below folder: bulk_*.vtu and joint_*.vtu per requested time
-    with fields.pvd (ParaView); bulk.msh and joint.msh with a view per field, all times in each
+    """Write the fields of a solution below folder: a .vtu file for each body, joint and requested
+    time with fields.pvd (ParaView); bulk.msh and joint.msh with a view per field, all times in each
     (Gmsh).
 
     Dam and foundation have their own points on the joint, so that the opening is visible; the
@@ -67,54 +67,54 @@ def write_fields(solution: Solution, folder: Path) -> None:
     bodies = {n: solution.bodies[n] for n in next(iter(fields.values())).displacement}
     surfaces = [joint_body(solution.bodies, k) for k in range(len(solution.result.joints))]
     fine = {name: of_order(body, order) for name, body in bodies.items()}
-    points = np.concatenate([body.points for body in fine.values()])
-    cells, regions = bulk_cells(fine)
-    displacement = {t: np.vstack([f.displacement[n] for n in bodies]) for t, f in fields.items()}
-    stress = {t: np.vstack([f.stress[n] for n in bodies]) for t, f in fields.items()}
     fine_surfaces = [of_order(surface, order) for surface in surfaces]
-    joint = joined(fine_surfaces)
-    on_joint = {time: joints_data(solution, fine_surfaces, time) for time in fields}
-
+    regions = {name: bulk_cells({name: body})[1] for name, body in bodies.items()}
     for time, field in fields.items():
         whole = {LEVEL: solution.result.at(time)["level"][:1]}
-        smallest, _, largest = principal(stress[time]).T
-        in_elements = {
-            STRESS: stress[time],
-            "largest principal stress [Pa]": largest,
-            "smallest principal stress [Pa]": smallest,
-            "body": regions,
-        }
-        at_nodes = {DISPLACEMENT: np.vstack([everywhere(field, n) for n in bodies])}
-        write_vtu(folder / f"bulk_t{time:g}.vtu", points, cells, at_nodes, in_elements, whole)
-        on_faces = {
-            DISPLACEMENT: displacement_of_joints(solution, field, order),
-            "opening [m]": np.maximum(on_joint[time]["jump"][:, 1], 0),
-            **{with_unit(name): values for name, values in on_joint[time].items()},
-        }
-        path = folder / f"joint_t{time:g}.vtu"
-        write_vtu(path, joint.points, joint.cells, on_faces, {}, whole)
-    write_collection(folder, fields)
+        for name, body in fine.items():
+            smallest, _, largest = principal(field.stress[name]).T
+            in_elements = {
+                STRESS: field.stress[name],
+                "largest principal stress [Pa]": largest,
+                "smallest principal stress [Pa]": smallest,
+                "body": regions[name],
+            }
+            at_nodes = {DISPLACEMENT: everywhere(field, name)}
+            path = file_of(folder, name, time)
+            write_vtu(path, body.points, body.cells, at_nodes, in_elements, whole)
+        for k, surface in enumerate(fine_surfaces):
+            data = joint_data(solution.result.joints[k], surface, time)
+            on_faces = {
+                DISPLACEMENT: displacement_of_joint(solution, field, k, order),
+                "opening [m]": np.maximum(data["jump"][:, 1], 0),
+                **{with_unit(name): values for name, values in data.items()},
+            }
+            path = file_of(folder, numbered("joint", k), time)
+            write_vtu(path, surface.points, surface.cells, on_faces, {}, whole)
+    write_collection(solution, [*reversed(bodies)], folder)
+    displacement = {t: np.vstack([f.displacement[n] for n in bodies]) for t, f in fields.items()}
+    stress = {t: np.vstack([f.stress[n] for n in bodies]) for t, f in fields.items()}
     bulk_views: list[View] = [
         (DISPLACEMENT, "NodeData", displacement),
         (STRESS, "ElementData", {t: s[:, TENSOR] for t, s in stress.items()}),
     ]
-    corners = np.concatenate(
-        [
-            np.arange(len(f.points)) < len(c.points)
-            for f, c in zip(fine_surfaces, surfaces, strict=True)
-        ]
-    )
+    on_joint = {time: joints_data(solution, surfaces, time) for time in fields}
     joint_views: list[View] = [
-        (with_unit(name), "NodeData", {t: d[name][corners] for t, d in on_joint.items()})
+        (with_unit(name), "NodeData", {t: d[name] for t, d in on_joint.items()})
         for name in OF_JOINT
         if name in next(iter(on_joint.values()))
     ]
     with atomic_write(folder / "bulk.msh") as path:
-        of_bodies = np.concatenate([body.points for body in bodies.values()])
-        write_views(path, of_bodies, bulk_cells(bodies)[0], bulk_views)
+        points = np.concatenate([body.points for body in bodies.values()])
+        write_views(path, points, bulk_cells(bodies)[0], bulk_views)
     with atomic_write(folder / "joint.msh") as path:
-        linear = joined(surfaces)
-        write_views(path, linear.points, linear.cells, joint_views)
+        joint = joined(surfaces)
+        write_views(path, joint.points, joint.cells, joint_views)
+
+
+def file_of(folder: Path, part: str, time: float) -> Path:
+    """File for ParaView of a body or joint at a time: dam_2_t1.5.vtu."""
+    return folder / f"{part.replace(' ', '_')}_t{time:g}.vtu"
 
 
 def everywhere(field: Field, body: str) -> np.ndarray:
@@ -162,32 +162,28 @@ def joints_data(solution: Solution, surfaces: Sequence[Body], time: float) -> Ta
     """The tables of all joints at the points of their surfaces, see `joint_data`; nan where a joint
     has no such column.
     """
-    parts = []
-    for k, (joint, surface) in enumerate(zip(solution.result.joints, surfaces, strict=True)):
-        number = np.full(len(surface.points), k + 1.0)
-        parts.append(joint_data(joint, surface, time) | {"joint": number})
-    names = [name for name in (*OF_JOINT, "joint") if any(name in part for part in parts)]
-    missing = [np.full(len(part["joint"]), np.nan) for part in parts]
+    pairs = zip(solution.result.joints, surfaces, strict=True)
+    parts = [joint_data(joint, surface, time) for joint, surface in pairs]
+    missing = [np.full(len(surface.points), np.nan) for surface in surfaces]
     return {
         name: np.concatenate([p.get(name, m) for p, m in zip(parts, missing, strict=True)])
-        for name in names
+        for name in OF_JOINT
+        if any(name in part for part in parts)
     }
 
 
 def with_unit(name: str) -> str:
-    """The name of an array of a joint with its unit: jump [m]; joint, a number, has none."""
-    return f"{name} [{OF_JOINT[name][0]}]" if name in OF_JOINT else name
+    """The name of an array of a joint with its unit: jump [m]."""
+    return f"{name} [{OF_JOINT[name][0]}]"
 
 
-def displacement_of_joints(solution: Solution, field: Field, order: int) -> np.ndarray:
-    """Displacement (n, 3) [m] of the bodies below the joints, at the points of all joints."""
-    parts = []
-    lower_bodies = [joint.lower for joint in solution.result.case.of_joints] or ["foundation"]
-    for k, lower in enumerate(lower_bodies):
-        below, surface = solution.bodies[lower], joint_body(solution.bodies, k)
-        nodes = elements.Space(below, order).find(elements.Space(surface, order))
-        parts.append(everywhere(field, lower)[nodes])
-    return np.concatenate(parts)
+def displacement_of_joint(solution: Solution, field: Field, joint: int, order: int) -> np.ndarray:
+    """Displacement (n, 3) [m] of the body below a joint, by its number from 0, at its points."""
+    of_joints = solution.result.case.of_joints
+    lower = of_joints[joint].lower if of_joints else "foundation"
+    below, surface = solution.bodies[lower], joint_body(solution.bodies, joint)
+    nodes = elements.Space(below, order).find(elements.Space(surface, order))
+    return everywhere(field, lower)[nodes]
 
 
 def principal(stress: np.ndarray) -> np.ndarray:
@@ -275,16 +271,42 @@ def data_array(name: str, values: np.ndarray) -> str:
     return f'<DataArray type="{kind}" Name="{name}" {size} format="binary">{text}</DataArray>\n'
 
 
-def write_collection(folder: Path, fields: dict[float, Field]) -> None:
-    """Write fields.pvd, which lists the .vtu files of all times."""
+def write_collection(solution: Solution, bodies: Sequence[str], folder: Path) -> None:
+    """Write fields.pvd: the .vtu files of all times, with the names of their bodies and joints."""
+    blocks = block_names(solution, bodies)
     entries = [
-        f'<DataSet timestep="{time!r}" name="{block}" part="{part}" file="{name}_t{time:g}.vtu"/>\n'
-        for time in fields
-        for part, (name, block) in enumerate(BLOCKS.items())
+        f'<DataSet timestep="{shown!r}" name={quoteattr(block)} part="{part}" '
+        f'file="{file_of(folder, name, time).name}"/>\n'
+        for time, shown in shown_times(solution).items()
+        for part, (name, block) in enumerate(blocks.items())
     ]
     collection = f"<Collection>\n{''.join(entries)}</Collection>"
     with atomic_write(folder / "fields.pvd") as path:
         path.write_text(f'<VTKFile type="Collection" version="0.1">\n{collection}\n</VTKFile>\n')
+
+
+def block_names(solution: Solution, bodies: Sequence[str]) -> dict[str, str]:
+    """Names of the bodies and joints for ParaView, by those of the mesh: of a section with lifts
+    `dam above lift 12 m`, `joint lift 12 m`.
+    """
+    case = solution.result.case
+    above = {j.upper: f"dam above {j.name}" for j in case.of_joints if not case.geometry}
+    joints = {
+        numbered("joint", k): f"joint {case.named((k,))}".strip()
+        for k in range(len(solution.result.joints))
+    }
+    return {name: above.get(name, name) for name in bodies} | joints
+
+
+def shown_times(solution: Solution) -> dict[float, float]:
+    """The time that ParaView shows for each time of the fields: the reservoir level [m] where it
+    rises from each to the next and loads have no time of their own, else the time itself.
+    """
+    times = [*solution.fields]
+    levels = [float(solution.result.at(time)["level"][0]) for time in times]
+    case = solution.result.case
+    rises = bool(np.all(np.diff(levels) > 0)) and not case["time_unit"]
+    return dict(zip(times, levels if rises else times, strict=True))
 
 
 def write_views(path: Path, points: np.ndarray, cells: Cells, views: list[View]) -> None:

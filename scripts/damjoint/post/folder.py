@@ -38,7 +38,10 @@ PICTURES = (
     *("", "_curve", "_check", "_critical", "_quake", "_modes", "_water", "_sensitivity"),
     "_calibration",
 )
-FIELDS = r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd"
+#: Files of a body or a joint for ParaView, and all of fields/; in those of earlier versions all
+#: bodies were `bulk`.
+PARTS = r"(foundation|(dam|joint)(_\d+)?)_t[\w.+-]+\.vtu"
+FIELDS = PARTS + r"|bulk_t[\w.+-]+\.vtu|(bulk|joint)\.msh|fields\.pvd"
 #: States of a run that has come to its end: the last one; of the loads or of the equilibria.
 COMPLETE, STOPPED = "complete", "stopped"
 #: The tables of studies of several cases, in the folder above theirs, and their first columns.

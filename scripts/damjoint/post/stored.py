@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -17,12 +17,12 @@ from ..input.case import SECTION, SHARED, Case
 from ..input.case_names import is_name
 from ..input.joints import parsed_by_joint, stacked_joints
 from ..input.parameters import GEOMETRY_LISTS, constants, declared, listing
-from ..input.scene import numbered
+from ..input.scene import MATERIALS
 from ..mesh.body import Body
 from ..model.fields import Field, Solution
 from ..model.results import Info, Results, history_columns
 from .field_files import DISPLACEMENT, STRESS
-from .folder import read_info, scene_folders
+from .folder import PARTS, read_info, scene_folders
 
 #: Errors that reading damaged files can raise; SyntaxError: by XML.
 DAMAGED = (
@@ -161,21 +161,29 @@ def read_fields(folder: Path, times: np.ndarray) -> tuple[dict[str, Body], dict[
     bodies: dict[str, Body] = {}
     fields: dict[float, Field] = {}
     for time in times.tolist():
-        path = folder / f"bulk_t{time:g}.vtu"
-        if path.is_file():
-            check_file(folder / f"joint_t{time:g}.vtu")
+        end = f"_t{time:g}.vtu"
+        paths = [path for path in folder.glob(f"*{end}") if re.fullmatch(PARTS, path.name)]
+        joints, field = {}, Field({}, {})
+        for path in sorted(paths, key=from_the_highest):
+            check_file(path)
             # not meshio.read: it exits the process if a file is damaged
-            paths = path, folder / f"joint_t{time:g}.vtu"
-            bulk, joint = (linear(meshio.vtu.read(p)) for p in paths)
-            parts = {name: extract_body(bulk, regions) for name, regions in parts_of(bulk).items()}
-            bodies = {name: body for name, (body, _, _) in parts.items()}
-            bodies |= extract_joints(joint)
-            displacement = bulk.point_data[DISPLACEMENT]
-            fields[time] = Field(
-                {name: displacement[points] for name, (_, points, _) in parts.items()},
-                {name: stress for name, (_, _, stress) in parts.items()},
-            )
+            mesh = linear(meshio.vtu.read(path))
+            name = path.name.removesuffix(end).replace("_", " ")
+            if name.startswith("joint"):
+                joints[name], _ = corners_of_mesh(mesh)
+            else:
+                bodies[name], points, field.stress[name] = extract_body(mesh)
+                field.displacement[name] = mesh.point_data[DISPLACEMENT][points]
+        if paths:
+            bodies |= joints
+            fields[time] = field
     return bodies, fields
+
+
+def from_the_highest(path: Path) -> tuple[bool, int]:
+    """Order of the bodies by their files: dam 3, dam 2, dam, foundation."""
+    number = re.match(r"[a-z]+_(\d+)_t", path.name)
+    return path.name.startswith("foundation"), -int(number[1]) if number else -1
 
 
 def linear(mesh: meshio.Mesh) -> meshio.Mesh:
@@ -186,56 +194,33 @@ def linear(mesh: meshio.Mesh) -> meshio.Mesh:
     return mesh
 
 
-def parts_of(bulk: meshio.Mesh) -> dict[str, dict[int, str]]:
-    """The bodies of a mesh, from the highest: their regions by number."""
-    layer = int(constants()["LAYER"][0])
-    present = np.unique(np.concatenate(bulk.cell_data["body"])).astype(int).tolist()
-    dams = (number // layer for number in reversed(present))
-    dam = int(constants()["DAM"][0])
-    parts = {
-        numbered("dam", k): {dam + k * layer: "dam"} for k in dams if dam + k * layer in present
-    }
-    rock = {int(constants()[name.upper()][0]): name for name in ("foundation", "lower")}
-    return parts | {"foundation": rock}
+def corners_of_mesh(mesh: meshio.Mesh) -> tuple[Body, np.ndarray]:
+    """The corners of a mesh and its cells as a body; the indices of these points (n,)."""
+    used = np.unique(np.concatenate([block.data.ravel() for block in mesh.cells]))
+    cells = [(block.type, np.searchsorted(used, block.data)) for block in mesh.cells]
+    return body_of(mesh.points[used], cells), used
 
 
-def extract_joints(mesh: meshio.Mesh) -> dict[str, Body]:
-    """The surfaces of the joints of a mesh, by the numbers of its points' joints."""
-    number, joints = mesh.point_data["joint"].astype(int), {}
-    for k in np.unique(number).tolist():
-        tables = [block.data[number[block.data[:, 0]] == k] for block in mesh.cells]
-        used = np.unique(np.concatenate([table.ravel() for table in tables]))
-        cells = [
-            (block.type, np.searchsorted(used, table))
-            for block, table in zip(mesh.cells, tables, strict=True)
-        ]
-        shown = [(shape, table) for shape, table in cells if len(table)]
-        joints[numbered("joint", k - 1)] = body_of(mesh.points[used], shown)
-    return joints
+def extract_body(mesh: meshio.Mesh) -> tuple[Body, np.ndarray, np.ndarray]:
+    """A body with its regions, the indices of its points (n,), stress (elements, 6) [Pa]."""
+    regions = {int(constants()[name.upper()][0]): name for name in MATERIALS}
+    layer, blocks, stresses = int(constants()["LAYER"][0]), [], []
+    for block, numbers, stress in zip(
+        mesh.cells, mesh.cell_data["body"], mesh.cell_data[STRESS], strict=True
+    ):
+        for number in np.unique(numbers).tolist():
+            of_region = numbers == number
+            name = regions[number % layer]
+            blocks.append((name, meshio.CellBlock(block.type, block.data[of_region])))
+            stresses.append(stress[of_region])
+    names, cells = zip(*blocks, strict=True)
+    mesh.cells = [*cells]
+    body, used = corners_of_mesh(mesh)
+    return replace(body, regions=[*names]), used, np.concatenate(stresses)
 
 
-def extract_body(bulk: meshio.Mesh, numbers: dict[int, str]) -> tuple[Body, np.ndarray, np.ndarray]:
-    """Extract regions of a mesh, by number: body, indices of its points (n,), stress (elements, 6)
-    [Pa].
-    """
-    blocks = [
-        (numbers[number], block.type, block.data[region == number], stress[region == number])
-        for block, region, stress in zip(
-            bulk.cells, bulk.cell_data["body"], bulk.cell_data[STRESS], strict=True
-        )
-        for number in numbers
-        if (region == number).any()
-    ]
-    names, shapes, tables, stresses = zip(*blocks, strict=True)
-    used = np.unique(np.concatenate([table.ravel() for table in tables]))
-    cells = [(s, np.searchsorted(used, t)) for s, t in zip(shapes, tables, strict=True)]
-    return body_of(bulk.points[used], cells, names), used, np.concatenate(stresses)
-
-
-def body_of(
-    points: np.ndarray, cells: list[tuple[str, np.ndarray]], regions: Sequence[str] = ()
-) -> Body:
+def body_of(points: np.ndarray, cells: list[tuple[str, np.ndarray]]) -> Body:
     """Build a body with consecutive tags."""
     count = sum(len(table) for _, table in cells)
     tags, elements = np.arange(1, len(points) + 1), np.arange(1, count + 1)
-    return Body(points, tags, cells, elements, list(regions))
+    return Body(points, tags, cells, elements)
