@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal, localcontext
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,14 +62,9 @@ class Stored:
     void: Array
     inflow: Array
 
-    def mixed(self, share: float, other: Stored) -> Stored:
-        """Return the mean with a share of another state."""
-        pairs = (
-            (self.volume, other.volume),
-            (self.void, other.void),
-            (self.inflow, other.inflow),
-        )
-        return Stored(*((1 - share) * own + share * its for own, its in pairs))
+
+#: Without drains, and with drains of full effect.
+Histories: TypeAlias = tuple[Stored, Stored]
 
 
 @dataclass(frozen=True)
@@ -114,25 +110,33 @@ class Slot:
         """What the nodes store by pressure (n,) [m3/Pa per metre]."""
         return np.asarray(self.network.first.values["storage"] * self.lumped(uniform=True))
 
-    def at_rest(self) -> Stored:
-        """Return what is stored in steady flow; suction stores nothing."""
-        head = self.network.first.unit_weight * self.network.heads
-        pressure = np.maximum(head - self.elevation, 0)
-        nothing = np.zeros(len(pressure))
-        return Stored(self.lumped(False) + self.storage * pressure, nothing, nothing)
+    def at_rest(self) -> Histories:
+        """Return what is stored in steady flow, without and with drains; suction stores nothing."""
+        network = self.network
+        weight, (outlets, _) = network.first.unit_weight, network.drains()
+        free = network.solve(uniform=not network.flowing).heads
+        act = bool(outlets) and all(free[n] > head for n, head in outlets.items())
+        nothing = np.zeros(len(free))
 
-    def step(self, begin: Stored, seconds: float) -> tuple[Array, Stored]:
-        """Return the pressure at the nodes (n,) [Pa] at the end of a step, and what is stored."""
-        end = self.without_drains(begin, seconds, {})
+        def under(heads: Array) -> Stored:
+            pressure = np.maximum(weight * heads - self.elevation, 0)
+            return Stored(self.lumped(False) + self.storage * pressure, nothing, nothing)
+
+        return under(free), under(network.solve(False, outlets).heads if act else free)
+
+    def step(self, begins: Histories, seconds: float) -> tuple[Array, Histories]:
+        """Return the pressure at the nodes (n,) [Pa] at the end of a step, and what is stored: the
+        water without drains, and that with drains of full effect, have histories of their own.
+        """
         drains, effect = self.network.drains()
         weight = self.network.first.unit_weight
         outlets = {n: weight * head for n, head in drains.items()}
-        total = end.pressure + self.elevation
-        if not effect or not outlets or any(total[n] <= head for n, head in outlets.items()):
-            return end.pressure, end.stored
-        drained = self.without_drains(begin, seconds, outlets)
-        pressure = (1 - effect) * end.pressure + effect * drained.pressure
-        return pressure, end.stored.mixed(effect, drained.stored)
+        free, drained = (self.without_drains(begin, seconds, {}) for begin in begins)
+        total = drained.pressure + self.elevation
+        if outlets and all(total[n] > head for n, head in outlets.items()):
+            drained = self.without_drains(begins[1], seconds, outlets)
+        pressure = (1 - effect) * free.pressure + effect * drained.pressure
+        return pressure, (free.stored, drained.stored)
 
     def without_drains(self, begin: Stored, seconds: float, fixed: dict[int, float]) -> Filled:
         """Return the end of a step, see `step`; fixed: heads times the weight of water [Pa] beside
@@ -294,7 +298,7 @@ def replayed(files: Files, asked: Asked, steps: Table) -> Iterator[Wet]:
     if not plan:
         return
     _, like = next(iter(states(files, asked, steps)))
-    known: dict[tuple[int, int], Stored] = {}
+    known: dict[tuple[int, int], Histories] = {}
     lost = set[int]()
 
     def slots(number: int) -> list[Slot]:

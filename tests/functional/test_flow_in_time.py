@@ -15,7 +15,6 @@ from damjoint.solver.controls import LevelControl
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.solver.model import Model, StepOptions
 from damjoint.statics.hints import hints
-from damjoint.statics.notes import notes
 from damjoint.studies.report import water_of
 
 WATER, VISC = 9810.0, 1e-3
@@ -177,7 +176,7 @@ def test_the_steady_limit_of_networks(scene):
 def test_order_in_time_of_networks(scene):
     """Joints that open linearly in time and store water: halved steps halve the error."""
     settings = {"storage": 1e-8, "aperture_min": 5e-4, "pressure_min": -1e5}
-    model = scene(time_unit=1.0, drain_effectiveness=1.0, **settings).model
+    model = scene(time_unit=1.0, **settings).model
     last = opened(model, [1e-4] * len(model.equilibrium.interface.joints))
     pressures, inflow = [], []
     for number in (20, 40, 80):
@@ -268,14 +267,31 @@ def test_drains_take_water():
     assert history["water"] - history["water_in"] == pytest.approx(2.8e-4, rel=1e-9)
 
 
-def test_drains_of_part_effect_are_noted():
-    """Their effect in a step is that on the water without drains, whatever the step's length."""
-    water = {"uplift": "flow", "time_unit": 600.0, "drains": 1.0}
-    part, full = (load("dam", water | {"drain_effectiveness": e}) for e in (0.8, 1.0))
-    (note,) = (text for text in notes(part) if "acts anew in each step" in text)
-    assert note.startswith("drain_effectiveness = 0.8 with flow in time")
-    assert not any("acts anew" in text for text in notes(full))
-    assert not any("acts anew" in text for text in notes(part.changed({"time_unit": 0.0})))
+def test_water_at_drains_of_part_effect():
+    """A slot that fills: e times its pressure with drains of full effect plus 1 - e times that
+    without drains, with steps of any length; in the end that of steady flow, to rounding.
+    """
+    settings = {"time_unit": 1.0, "storage": 1e-12, "aperture_min": 1e-4, "n_joint": 28.0}
+    settings |= OPENS | {"uplift": "flow", "drains": 1.0, "drain_x": 4.0}
+    scale = 28**2 * 12 * VISC * 1e-12 / 1e-4**3  # s, of the diffusion through the joint
+    by_effect = []
+    for effect in (0.0, 0.7, 1.0):
+        model = Model(load("dam", settings | {"drain_effectiveness": effect}, (30.0,)))
+        closed, pressures = model.start().jump, []
+        for number, seconds in (10, 0.02 * scale), (40, 0.02 * scale), (2, 1e18 * scale):
+            slot = Slot(model, closed, Loading(30.0, 0.0))
+            for _ in range(number):
+                pressure = slot.step(closed, seconds / number)
+            pressures.append(pressure)
+            stored, inflow = slot.stored.volume.sum(), slot.stored.inflow
+            assert stored - inflow.sum() == pytest.approx(28e-4, abs=1e-12 * abs(inflow).max())
+        by_effect.append(pressures)
+    free, part, full = by_effect
+    for n in range(3):
+        assert part[n] == pytest.approx(0.3 * free[n] + 0.7 * full[n], abs=1e-6)
+    at_drains = np.abs(slot.x - 4).argmin()
+    assert part[2][at_drains] == pytest.approx(0.3 * 30 * WATER * 24 / 28, rel=1e-12)
+    assert abs(part[0] - part[1]).max() < 0.05 * 30 * WATER
 
 
 def test_in_three_dimensions():

@@ -84,6 +84,16 @@ def test_thin_water_is_the_steady_flow_of_the_moment(record):
     assert seen > 0.1 * static.max()
 
 
+def test_drains_of_part_effect_keep_the_pressure_of_a_closed_joint(record):
+    """It does not open: water that is stored is at rest in every step, as before the earthquake."""
+    drains = {"drains": 1.0, "drain_x": 5.0, "drain_effectiveness": 0.6, "n_joint": 6.0}
+    quake = earthquake(record, WET | drains | {"adhesion": 1e9, "storage": 1e-9}, "30")
+    (before,) = quake.problem.static.pressures
+    for _, step in zip(range(10), quake.steps(), strict=False):
+        (pressure,) = step.end.state.pressures
+        assert pressure.nodes == pytest.approx(before.nodes, abs=1e-9 * before.nodes.max())
+
+
 def test_an_interrupted_earthquake_continues_with_its_water(record, tmp_path):
     settings = WET | {"n_joint": 6.0}
     quake = earthquake(record, settings, "30")

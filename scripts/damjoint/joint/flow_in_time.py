@@ -41,7 +41,7 @@ LAST_BIT = 2.0**-53
 class StoredWater:
     """The water in joints that exchange it, at their nodes (n,) [m3; 2D: per metre]: stored; voids
     beside it; what has come in by ends and drains so far. time: t of this state; begin: that from
-    which the step has led to here.
+    which the step has led to here. parts: this is their mean, see `FlowInTime`.
     """
 
     time: float
@@ -49,6 +49,7 @@ class StoredWater:
     void: Array
     inflow: Array
     begin: StoredWater | None = None
+    parts: tuple[StoredWater, ...] = ()
 
     def after(self, begin: StoredWater) -> StoredWater:
         """This state, as the end of a step from another one."""
@@ -57,23 +58,37 @@ class StoredWater:
 
 @dataclass(frozen=True, kw_only=True)
 class TimeStep:
-    """A step of the water: its length [s] and what is stored at its beginning."""
+    """A step of the water: its length [s] and what is stored at its beginning; part: its number
+    among those of drains of part effect.
+    """
 
     seconds: float
     begin: StoredWater
+    part: int = 0
+
+    @property
+    def of_parts(self) -> tuple[TimeStep, TimeStep]:
+        """The step without drains, and with drains of full effect."""
+        begins = self.begin.parts or (self.begin,) * 2
+        free, drained = (
+            replace(self, begin=begin, part=number) for number, begin in enumerate(begins)
+        )
+        return free, drained
 
 
 @dataclass(frozen=True, kw_only=True)
 class FlowInTime(FlowSolution):
     """A solution at the end of a time step, with the water at the nodes: stored, voids, inflow in
     the step, as in `StoredWater`. at_ends: pressure beyond the imposed one at the ends [Pa]: a dry
-    one may be higher than the imposed head.
+    one may be higher than the imposed head. parts: with drains of part effect, the solutions
+    without drains and with full effect, of which this is the mean; each stores water of its own.
     """
 
     at_ends: Array
     volume: Array
     void: Array
     inflow: Array
+    parts: tuple[FlowInTime, ...] = ()
 
     def mixed(self, share: float, other: FlowSolution) -> FlowInTime:
         """Mean with another solution of some share (0 to 1)."""
@@ -91,7 +106,12 @@ class FlowInTime(FlowSolution):
     def stored(self, time: float, begin: StoredWater) -> StoredWater:
         """The state at the end of a step from another one."""
         inflow = begin.inflow + self.inflow
-        end = StoredWater(time=time, volume=self.volume, void=self.void, inflow=inflow)
+        begins = begin.parts or (begin,) * 2
+        parts = tuple(
+            replace(part.stored(time, own), begin=None)
+            for part, own in zip(self.parts, begins, strict=False)
+        )
+        end = StoredWater(time=time, volume=self.volume, void=self.void, inflow=inflow, parts=parts)
         return end.after(begin)
 
 

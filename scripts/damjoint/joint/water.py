@@ -365,11 +365,11 @@ class WaterSystem:
         #: whether the path through a joint goes on in another one
         self.in_series = network is not None and network.in_series
         self.unit_weight = members[0].case["rho_water"] * members[0].case["g"]
-        #: voids of the last flow in time, by the number of drained nodes: where the next search
-        #: for them begins, whose result does not depend on it
-        self.last_voids: dict[int, Array] = {}
+        #: voids of the last flow in time, by the number of drained nodes and the part: where the
+        #: next search for them begins, whose result does not depend on it
+        self.last_voids: dict[tuple[int, int], Array] = {}
         #: likewise: by how much turbulence slows the last flow
-        self.last_slowed: dict[int, Array] = {}
+        self.last_slowed: dict[tuple[int, int], Array] = {}
         #: of the last loadings, see `_heads`
         self.heads = lru_cache(maxsize=4)(self._heads)
 
@@ -430,16 +430,18 @@ class WaterSystem:
         loading: Loading,
         before_quake: BeforeQuake | None = None,
         step: TimeStep | None = None,
+        effect: float | None = None,
     ) -> FlowSolution:
         """Pressure of flowing water beyond the imposed one at the inner nodes, for the internal
         variables of all joints; before_quake: see `StepWater`; step: in which water is
-        stored, the solution is a `FlowInTime`; None: the flow is steady.
+        stored, the solution is a `FlowInTime`; None: the flow is steady; effect: of the drains,
+        None: by `drain_effectiveness`.
 
         Drains reduce the head above their outlet, the tailwater or their own height, by their
         effectiveness e: the pressure is e times that with the outlet's head at the drains, plus
-        1 - e times that without drains. A crack that reaches the drains ends their effect
-        (EM 1110-2-2200): e falls to zero while it grows through the elements beside them, in which
-        all the head between it and the drains is lost meanwhile.
+        1 - e times that without drains; both store water of their own. A crack that reaches the
+        drains ends their effect (EM 1110-2-2200): e falls to zero while it grows through the
+        elements beside them, in which all the head between it and the drains is lost meanwhile.
         """
         opened = [water.opened(jump, variables, before_quake) for water in self.members]
         factors = [
@@ -457,22 +459,27 @@ class WaterSystem:
             ends, exits = self._ends(loading)
             at_ends = weight * ends
 
-        def solved(conductivity: Array, nodes: IntArray, outlet: Array) -> FlowSolution:
+        def solved(
+            conductivity: Array, nodes: IntArray, outlet: Array, step: TimeStep | None = step
+        ) -> FlowSolution:
             if not self.turbulent.any():
-                return by_conductivity(conductivity, nodes, outlet)
+                return by_conductivity(conductivity, nodes, outlet, step)
+            like = len(nodes), step.part if step else 0
             per_gradient = 2 * self.reference * conductivity / self.flow.points.weights
             per_gradient *= self.members[0].case["rho_water"] / self.members[0].case["visc"]
             per_gradient *= self.turbulent
             solution, last = turbulent_flow(
-                lambda share: by_conductivity(share * conductivity, nodes, outlet),
+                lambda share: by_conductivity(share * conductivity, nodes, outlet, step),
                 (self.reference if step else 1) * conductivity,
                 per_gradient,
-                self.last_slowed.get(len(nodes)),
+                self.last_slowed.get(like),
             )
-            self.last_slowed[len(nodes)] = last
+            self.last_slowed[like] = last
             return solution
 
-        def by_conductivity(conductivity: Array, nodes: IntArray, outlet: Array) -> FlowSolution:
+        def by_conductivity(
+            conductivity: Array, nodes: IntArray, outlet: Array, step: TimeStep | None
+        ) -> FlowSolution:
             if step:
                 return self.solve_in_time(
                     step, jump, conductivity, imposed, at_ends, nodes, weight * outlet
@@ -485,38 +492,50 @@ class WaterSystem:
                 return replace(solution, pressure=beyond)
             return solution
 
-        free = solved(conductivity, NO_NODES, np.zeros(0))
         all_drains = [
             water.drainage(*at)
             for water, at in zip(self.members, opened, strict=True)
             if water.drains
         ]
         acting = [drains for drains in all_drains if drains.remaining]
-        if not acting:
+        if effect is None:
+            effect = self.drain_effectiveness
+        without, fully = step.of_parts if step and 0 < effect < 1 else (step, step)
+        free = solved(conductivity, NO_NODES, np.zeros(0), without)
+        if not acting or effect == 0:
             return free
         nodes, outlet = outlets(acting, loading)
-        at_drains = head[nodes] + self.expand_to_nodes(free)[nodes] / weight
-        effect = acting[0].water.case["drain_effectiveness"]
-        if not (at_drains > outlet).all() or effect == 0:
+
+        def act_on(free: FlowSolution) -> bool:
+            at_drains = head[nodes] + self.expand_to_nodes(free)[nodes] / weight
+            return bool((at_drains > outlet).all())
+
+        if without is not fully:
+            drained = solved(conductivity, NO_NODES, np.zeros(0), fully)
+            if act_on(drained):
+                drained = solved(conductivity, nodes, outlet, fully)
+            assert isinstance(free, FlowInTime) and isinstance(drained, FlowInTime)
+            return replace(free.mixed(effect, drained), parts=(free, drained))
+        if not act_on(free):
             return free
         if all(drains.remaining == 1 for drains in acting):
             return free.mixed(effect, solved(conductivity, nodes, outlet))
-        return self.with_fading(free, acting, conductivity, loading, solved, before_quake)
+        return self.with_fading(free, acting, effect, conductivity, loading, solved, before_quake)
 
     def with_fading(
         self,
         free: FlowSolution,
         acting: list[Drainage],
+        effect: float,
         conductivity: Array,
         loading: Loading,
         solved: Callable[[Array, IntArray, Array], FlowSolution],
         before_quake: BeforeQuake | None,
     ) -> FlowSolution:
         """The flow with drains of which a crack leaves a part: free, without drains; acting: those
-        that do; conductivity, loading, before_quake: see `solve`; solved: the flow for
+        that do; effect, conductivity, loading, before_quake: see `solve`; solved: the flow for
         conductivities and heads at drains. The elements beside fading drains are closed in it.
         """
-        effect = acting[0].water.case["drain_effectiveness"]
         shut, closed = np.zeros(len(conductivity), bool), conductivity.copy()
         for drains in acting:
             if drains.remaining < 1:
@@ -562,6 +581,7 @@ class WaterSystem:
         heads[dry] = elevation[dry]
         heads[drains] = drained
         known[ends] = known[drains] = True
+        like = len(drains), step.part
         balance = WaterBalance(
             flow=flow,
             step=step,
@@ -569,10 +589,10 @@ class WaterSystem:
             storage=self.storage,
             elevation=elevation,
             lowest=case["pressure_min"],
-            guess=self.last_voids.get(len(drains), step.begin.void) > 0,
+            guess=self.last_voids.get(like, step.begin.void) > 0,
         )
         solution = balance.solve(self.reference * conductivity, imposed, heads, known, dry)
-        self.last_voids[len(drains)] = solution.void
+        self.last_voids[like] = solution.void
         return solution
 
     @cached_property
@@ -582,6 +602,12 @@ class WaterSystem:
         """
         may = [w.case["turbulent"] and w.case["uplift"] == "flow" for w in self.members]
         return np.repeat(np.array(may, bool), [len(w.joint.points.weights) for w in self.members])
+
+    @property
+    def drain_effectiveness(self) -> float:
+        """Of its drains, the same for all; 0 without drains."""
+        effects = (w.case["drain_effectiveness"] for w in self.members if w.drains)
+        return float(next(effects, 0.0))
 
     @property
     def reference(self) -> float:
@@ -615,11 +641,20 @@ class WaterSystem:
         self, jump: Array, variables: JointVariables, loading: Loading, time: float
     ) -> StoredWater:
         """What is stored by steady flow at a jump, at a time; suction stores nothing."""
-        beyond = self.expand_to_nodes(self.solve(jump, variables, loading))
         elevation = self.unit_weight * self.fields.joint.surface.points[:, 1]
-        head = self.unit_weight * self.heads(loading) + beyond
-        pressure = np.maximum(head - elevation, 0)
-        return stored_at_rest(self.volume(jump), self.storage, pressure, time)
+        imposed, volume = self.unit_weight * self.heads(loading), self.volume(jump)
+
+        def by(effect: float) -> StoredWater:
+            solution = self.solve(jump, variables, loading, effect=effect)
+            pressure = np.maximum(imposed + self.expand_to_nodes(solution) - elevation, 0)
+            return stored_at_rest(volume, self.storage, pressure, time)
+
+        effect = self.drain_effectiveness
+        if not 0 < effect < 1:
+            return by(effect)
+        free, drained = by(0.0), by(1.0)
+        mean = (1 - effect) * free.volume + effect * drained.volume
+        return replace(free, volume=mean, parts=(free, drained))
 
     def gradients(self, solution: FlowSolution, water: JointWater) -> list[Array]:
         """Gradient of the total head times the water's weight at the Gauss points of one of the

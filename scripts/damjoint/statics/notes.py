@@ -13,7 +13,7 @@ from ..input.casefile import blocks_of
 from ..input.constraints import STAGED, USUAL, WORKS
 from ..input.parameters import declared
 from ..input.scene import BED, DOWN, FLOOR, TAILWATER, TOP, UP
-from ..input.values import flows_in_time, has_drains
+from ..input.values import has_drains
 from ..mesh.generate import GEOMETRY
 from ..mesh.mesh import Mesh, mesh_of
 from ..mesh.topology import size_below
@@ -119,12 +119,6 @@ def loads_in_part(case: Case) -> Iterator[str]:
         yield f"ice_level = {case['ice_level']:g} m is above the water, {highest:g} m at most"
     for joint, name in zip(case.joints, case.joint_names, strict=True):
         where = f"{name}: " if case.of_joints else ""
-        if has_drains(joint) and flows_in_time(joint) and 0 < joint["drain_effectiveness"] < 1:
-            yield (
-                f"{where}drain_effectiveness = {joint['drain_effectiveness']:g} with flow in time: "
-                "acts anew in each step, so that water that is stored drains the more the "
-                "shorter the steps, in the limit as with 1"
-            )
         if has_drains(joint) and joint["drain_level"] >= highest > 0:
             yield (
                 f"{where}drain_level = {joint['drain_level']:g} m: the drains never act, the water "
