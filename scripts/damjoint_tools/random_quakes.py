@@ -11,6 +11,7 @@ from damjoint.input.case import Case
 
 from .random_scenes import (
     CURVE_DRAWS,
+    MIXED_DRAWS,
     TIME_DRAWS,
     Drawn,
     RandomNumbers,
@@ -19,6 +20,7 @@ from .random_scenes import (
     mesh,
     of_joints,
     with_curve,
+    with_mixed,
 )
 
 #: Third number of the seed of earthquakes, which are drawn apart.
@@ -116,7 +118,10 @@ def random_quake(seed: int, number: int, folder: Path) -> RandomQuake:
     scene = RandomQuake(settings, level, "0", 1, record, file, kind)
     draw = {DAM: dam, ELASTIC: elastic, BLOCK: block}[kind]
     drawn_scene = draw(rng, scene, solid)
-    settings = with_curve(drawn_scene.settings, RandomNumbers(seed, number, CURVE_DRAWS))
+    settings = drawn_scene.settings
+    if kind == DAM:
+        settings = with_mixed(settings, RandomNumbers(seed, number, MIXED_DRAWS))
+    settings = with_curve(settings, RandomNumbers(seed, number, CURVE_DRAWS))
     drawn_scene = replace(drawn_scene, settings=settings)
     if solid or kind != DAM:
         return drawn_scene

@@ -17,9 +17,10 @@ Choice = TypeVar("Choice")
 Drawn: TypeAlias = dict[str, Any]
 
 #: Third number of the seed of the lift joints, of temperature, works on the joint, waterstop, law =
-#: endo and variants of loads, of joints that meet, of softening curves, of flow in time, and of
-#: films, which are drawn apart.
+#: endo and variants of loads, of joints that meet, of softening curves, of flow in time, of films,
+#: and of law = mixed, which are drawn apart.
 LIFT_DRAWS, WORKS_DRAWS, NETWORK_DRAWS, CURVE_DRAWS, TIME_DRAWS, FILM_DRAWS = 1, 3, 4, 5, 6, 7
+MIXED_DRAWS = 8
 #: Parameters that are drawn for each joint, but for the place of its drains.
 OF_JOINTS = (
     *("law", "K_N", "K_T", "sigma_max", "adhesion", "mu", "pena_rupture", "alpha", "pena_tang"),
@@ -28,6 +29,8 @@ OF_JOINTS = (
 #: Young's modulus [Pa] up to which a change of temperature is as large as in a dam; that of a
 #: stiffer body is smaller, so that the stress is not larger.
 CONCRETE = 4e10
+#: Height of the two blocks of a network [m].
+NETWORK_HEIGHT = 45.0
 #: Height of the highest lift over the dam's.
 HIGHEST_LIFT = 0.85
 
@@ -123,10 +126,44 @@ def random_scene(seed: int, number: int) -> RandomScene:
     scene = with_works(scene, RandomNumbers(seed, number, WORKS_DRAWS))
     rng = RandomNumbers(seed, number, NETWORK_DRAWS)
     scene = network(rng) if rng.event(0.06) else scene
-    settings = with_curve(scene.settings, RandomNumbers(seed, number, CURVE_DRAWS))
+    settings = with_mixed(scene.settings, RandomNumbers(seed, number, MIXED_DRAWS))
+    settings = with_curve(settings, RandomNumbers(seed, number, CURVE_DRAWS))
     settings = with_time(settings, RandomNumbers(seed, number, TIME_DRAWS))
     settings = with_film(settings, RandomNumbers(seed, number, FILM_DRAWS))
     return replace(scene, settings=settings)
+
+
+def with_mixed(settings: Drawn, rng: RandomNumbers) -> Drawn:
+    """Settings, in some without works in one joint with law = mixed. It has no friction, so that a
+    dam stands only on what is left of its strength in shear, f_t sqrt(K_T/K_N), one to twenty times
+    the mean shear stress.
+    """
+    if not rng.event(0.12) or {"grout_pressure", "saw_thickness"} & settings.keys():
+        return settings
+    several = isinstance(settings["law"], tuple)
+    which = int(rng.choice(*range(len(settings["law"])))) if several else 0
+
+    def own(name: str) -> float:
+        return float(np.ravel(settings[name])[which])
+
+    K_N = own("K_N")
+    K_T = K_N if rng.event(0.3) else own("K_T")  # the former: CZM_EXP_REG
+    mean = 9810 * settings.get("dam_height", NETWORK_HEIGHT) / 2
+    strength = float(f"{rng.log_uniform(1, 20) * mean * np.sqrt(K_N / K_T):.3g}")
+    energy = rng.log_uniform(1.5, 100) * max(strength**2 / 2 / K_N, 1)
+    changed: Drawn = {
+        "law": "mixed",
+        "K_T": K_T,
+        "sigma_max": strength,
+        "G_f": float(f"{energy:.4g}"),
+    }
+    if several:
+        for name, value in changed.items():
+            values = list(settings.get(name, [declared()[name].default] * len(settings["law"])))
+            values[which] = value
+            changed[name] = tuple(values)
+    contact = {"pena_contact": rng.choice(1, 10)}
+    return settings | changed | contact
 
 
 def with_time(settings: Drawn, rng: RandomNumbers) -> Drawn:
@@ -162,7 +199,7 @@ def with_curve(settings: Drawn, rng: RandomNumbers) -> Drawn:
     """Settings, in some with exponential softening, which needs twice the fracture energy in shear;
     the curve is drawn from its own numbers, so that all else is what it was.
     """
-    if not rng.event(0.4) or not {"bond", "rupture"} & set(np.ravel(settings["law"])):
+    if not rng.event(0.4) or not {"bond", "rupture", "mixed"} & set(np.ravel(settings["law"])):
         return settings
     energies = {}
     if "G_t" in settings:

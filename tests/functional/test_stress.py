@@ -222,6 +222,7 @@ def test_scenes_have_all_that_is_drawn_and_can_be_loaded():
     words = "\n".join(" ".join(scene.words) for scene in scenes)
     for drawn in ("law=endo", "temperature_dam", "grout_pressure", "saw_thickness", "monoliths"):
         assert drawn in words
+    assert any("mixed" in np.ravel(scene.settings["law"]) for scene in scenes)
     assert "uplift=waterstop" in words and "quake_uplift=unchanged" in words
     assert "time_unit" in words
     for number, scene in enumerate(scenes):  # later draws leave the first ones as they were
