@@ -209,7 +209,7 @@ def test_random_earthquakes_can_be_loaded_and_have_all_laws_and_waters(tmp_path)
     scenes = [random_quake(5, number, tmp_path) for number in range(60)]
     cases = [scene.case for scene in scenes]
     assert {law for case in cases for law in (joint["law"] for joint in case.joints)} == {
-        *("rupture", "friction", "bond")
+        *("rupture", "friction", "bond", "mixed")
     }
     assert len({case["uplift"] for case in cases}) == 5
     assert {len(case.joints) for case in cases} == {1, 2, 3}
