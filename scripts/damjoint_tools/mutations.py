@@ -6,24 +6,25 @@ until the verification finds something; the verification itself is that of this 
 
 from __future__ import annotations
 
-import csv
 import itertools
 import os
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
 import damjoint
 from damjoint import RunError
+from damjoint.processes import pool_of
 from damjoint.progress import track
+from damjoint.studies.result_file import rows_session
 
 from .provenance import RECORDED, provenance
 from .random_quakes import random_quake
 from .random_scenes import RandomScene, random_scene
-from .stress import ONE_THREAD, run_of
+from .stress import ONE_THREAD, run_of, same_code
 
 #: Folders beside scripts/ that the package reads.
 DATA = "pro", "geo", "cases", "reference"
@@ -151,6 +152,34 @@ MUTATIONS = (
         having("time_unit"),
     ),
     Mutation(
+        "one history of the water for all drains",
+        "joint/flow_in_time.py",
+        "begins = self.begin.parts or (self.begin,) * 2",
+        "begins = (self.begin,) * 2",
+        both(having("time_unit"), having("drains", 1), drained),
+    ),
+    Mutation(
+        "voids from no pressure on",
+        "joint/water.py",
+        'lowest=case["pressure_min"],',
+        "lowest=0.0,",
+        both(having("time_unit"), having("pressure_min")),
+    ),
+    Mutation(
+        "fade of the drains beside a crack x 0.9",
+        "joint/water.py",
+        "remaining = 1 - float(beside @ (factor - 1)) / most",
+        "remaining = 1 - 0.9 * float(beside @ (factor - 1)) / most",
+        both(having("uplift", "cracked"), having("drains", 1)),
+    ),
+    Mutation(
+        "water in a joint that has not cracked",
+        "joint/water.py",
+        "opening = opening - self.law.opening_of_crack(variables, len(opening))",
+        "opening = opening - 0 * self.law.opening_of_crack(variables, len(opening))",
+        having("uplift", "cracked"),
+    ),
+    Mutation(
         "voids lose their water",
         "joint/flow_in_time.py",
         "volume=self.volume + self.storage * pressure - void,",
@@ -192,6 +221,27 @@ MUTATIONS = (
         "return np.maximum(progress, np.clip(share, 0, self.curve.end))",
         "return np.clip(share, 0, self.curve.end)",
         having("law", "bond"),
+    ),
+    Mutation(
+        "exponential softening: exp(-1.98 xi)",
+        "laws/softening.py",
+        "np.exp(-2 * np.maximum(progress, 0))",
+        "np.exp(-1.98 * np.maximum(progress, 0))",
+        having("softening"),
+    ),
+    Mutation(
+        "equivalent jump of mixed without K_T/K_N",
+        "laws/mixed.py",
+        "shear = self.ratio * (jump[:, 1:] ** 2).sum(axis=1)",
+        "shear = (jump[:, 1:] ** 2).sum(axis=1)",
+        having("law", "mixed"),
+    ),
+    Mutation(
+        "G_f of mixed x 1.02",
+        "laws/mixed.py",
+        'self.L_C = 2 * p["G_f"] / self.tensile_strength if self.tensile_strength else 0.0',
+        'self.L_C = 2.04 * p["G_f"] / self.tensile_strength if self.tensile_strength else 0.0',
+        having("law", "mixed"),
     ),
     Mutation(
         "mu of the first joint in all laws",
@@ -340,18 +390,20 @@ def look_for_number(number: int, seed: int) -> dict[str, object]:
 
 
 def mutate(seed: int, out: Path, jobs: int | None = None) -> list[dict[str, str]]:
-    """Look for all mutations in the scenes of a seed, and write a table into a file; returns its
-    rows.
+    """Look for those mutations in the scenes of a seed that are not in the result file yet; returns
+    the rows of all, in the order of MUTATIONS.
+
+    out: CSV of COLUMNS; a row is written when a mutation is noticed, or in no scene. Raises
+    InputError, also if the rows in the file were computed by other code.
     """
-    rows, now = dict[str, dict[str, object]](), provenance()
-    with ProcessPoolExecutor(jobs or os.cpu_count() or 1) as pool:
-        waiting = [pool.submit(look_for_number, k, seed) for k in range(len(MUTATIONS))]
-        for future in track(as_completed(waiting), "mutate", len(waiting)):
-            row = future.result()
-            rows[str(row["mutation"])] = row | now
-    with out.open("w", newline="") as file:
-        table = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
-        table.writeheader()
-        table.writerows(rows[mutation.name] for mutation in MUTATIONS)
-    with out.open() as file:
-        return list(csv.DictReader(file))
+    now, about = provenance(), {"mutate": {"rows": len(MUTATIONS), "seed": seed}}
+    with rows_session("mutate", out, COLUMNS, (), about) as (study, done):
+        same_code(out, done.values(), now)
+        missing = [k for k, mutation in enumerate(MUTATIONS) if mutation.name not in done]
+        with pool_of(jobs or os.cpu_count() or 1) as pool:
+            waiting = [pool.submit(look_for_number, k, seed) for k in missing]
+            for future in track(as_completed(waiting), "mutate", len(waiting)):
+                cells = future.result() | now
+                study.add([str(cells.get(name, "")) for name in COLUMNS])
+        done = study.file.read()
+    return [done[mutation.name] for mutation in MUTATIONS]

@@ -15,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import as_completed
 from dataclasses import replace
 from functools import partial
@@ -272,12 +272,7 @@ def stress(
     names = [f"{seed}-{number}" for number in range(count)]
     about = {"stress": {"rows": count, "seed": seed, "quake": quake}}
     with rows_session("stress", out, COLUMNS, ("dim", "seconds"), about) as (study, done):
-        for before in done.values():
-            if before["code"] != now["code"]:
-                other = f"damjoint {before['version']} ({before['commit'] or before['date']})"
-                raise InputError(
-                    f"out = {out}: must be a new file; this file has rows of {other}, other code"
-                )
+        same_code(out, done.values(), now)
         missing = [number for number, name in enumerate(names) if name not in done]
         records = out.resolve().with_name(f"{out.stem}_records") if quake else None
         rows = rows_as_completed(seed, missing, jobs or os.cpu_count() or 1, records)
@@ -286,6 +281,16 @@ def stress(
             study.add([str(cells.get(name, "")) for name in COLUMNS])
         done = study.file.read()
     return [done[name] for name in names]
+
+
+def same_code(out: Path, rows: Iterable[dict[str, str]], now: dict[str, str]) -> None:
+    """Raise InputError if a result file has rows of other code than now, see `provenance`."""
+    for before in rows:
+        if before["code"] != now["code"]:
+            other = f"damjoint {before['version']} ({before['commit'] or before['date']})"
+            raise InputError(
+                f"out = {out}: must be a new file; this file has rows of {other}, other code"
+            )
 
 
 def read_rows(path: Path) -> list[dict[str, str]]:

@@ -8,9 +8,13 @@ from typing import Any
 import numpy as np
 
 from .markdown import markdown
+from .mutations import MUTATIONS
 from .provenance import source_line
 from .quake_comparison import MEASURES
 from .stress import CLASSES, DEFECT, UNDECIDED, counts, read_rows
+
+#: Place of each mutation in the table.
+NUMBERS = {mutation.name: number for number, mutation in enumerate(MUTATIONS)}
 
 #: A row of a result file.
 Row = dict[str, str]
@@ -186,6 +190,7 @@ def dam_section(rows: list[Row]) -> str:
 def mutation_section(rows: list[Row]) -> str:
     """Return the section on errors in copies of the package."""
     noticed = sum(bool(row["scene"]) for row in rows)
+    rows = sorted(rows, key=lambda row: NUMBERS.get(row["mutation"], len(NUMBERS)))
     lines = [
         (
             row["mutation"],
