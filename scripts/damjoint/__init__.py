@@ -81,9 +81,7 @@ class RunError(RuntimeError):
 
 
 def data(folder: str) -> Path:
-    """The folder geo, pro, cases or reference: in the package where it is installed, else in the
-    checkout.
-    """
+    """The folder geo, pro, cases or reference: of the package if installed, or the checkout."""
     from pathlib import Path
 
     packaged = Path(__file__).parent / folder

@@ -57,9 +57,7 @@ def send_again() -> None:
 
 
 def unraisable(ignored: "sys.UnraisableHookArgs") -> None:
-    """Send an interrupt again that came where Python ignores exceptions, as around a fork or while
-    an object is deleted.
-    """
+    """Send an interrupt again that came where Python ignores exceptions, as around a fork."""
     if ignored.exc_type is KeyboardInterrupt:
         send_again()
     else:
@@ -77,9 +75,7 @@ def handle_signals() -> None:
 
 
 def enough_address_space() -> bool:
-    """Return whether the libraries can be loaded; with little address space set them to one
-    thread.
-    """
+    """Whether the libraries can be loaded; in little address space they get one thread."""
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit == resource.RLIM_INFINITY:
         return True

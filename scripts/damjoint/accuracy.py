@@ -234,9 +234,7 @@ def mesh_sequence(case: Case) -> list[Case]:
 
 
 def refine_mesh(case: Case, factor: float = 2) -> Case:
-    """Multiply the number of elements along the joint; the sizes far from it follow as automatic
-    ones do.
-    """
+    """Multiply the number of elements along the joint; the automatic sizes far from it follow."""
     refined = {
         "n_joint": factor * case["n_joint"],
         "n_layers": case["n_layers"] * (1 if has_plane_fields(case) else factor),

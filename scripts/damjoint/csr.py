@@ -37,9 +37,7 @@ def ranges(starts: IntArray, counts: IntArray) -> IntArray:
 
 @dataclass(frozen=True, eq=False)  # a key of caches, by identity
 class CsrMatrix:
-    """A matrix (m, n): the entries of row i are data[indptr[i] : indptr[i + 1]], in columns
-    `indices`, of which none is repeated in a row.
-    """
+    """A matrix (m, n): row i has data[indptr[i] : indptr[i + 1]], each in another of `indices`."""
 
     data: Array
     indices: IntArray

@@ -110,9 +110,7 @@ class Session(Record):
         folders.write_info(result, folder, state, statement)
 
     def add(self, result: Results, write: Callable[[Path], object]) -> None:
-        """Write fields or pictures of a saved scene into its folder; the time is added to that of
-        writing its tables.
-        """
+        """Write fields or pictures of a saved scene; adds their time to that of the tables."""
         start = time.perf_counter()
         write(self.folder(result))
         result.info["wall_seconds"]["post"] += time.perf_counter() - start

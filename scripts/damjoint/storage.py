@@ -48,9 +48,7 @@ def atomic_write(path: Path) -> Iterator[Path]:
 
 
 def cache_folder() -> Path | None:
-    """Folder of data that are computed once: $DAMJOINT_CACHE (empty: none), else in the user's
-    cache folder.
-    """
+    """Folder of data computed once: $DAMJOINT_CACHE (empty: none), or in the user's cache."""
     named = os.environ.get("DAMJOINT_CACHE")
     if named is not None:
         return Path(named) if named else None

@@ -17,9 +17,7 @@ FLUXES: Units = tuple((f"{name}g/(m s)", 1000.0**i) for i, name in enumerate(["k
 
 
 def unit(values: Iterable[np.ndarray], units: Units) -> tuple[str, float]:
-    """Choose the first unit in which the largest value is at least 1, the first one if all values
-    are 0; name and factor.
-    """
+    """The first unit in which the largest value is at least 1, or the first; name and factor."""
     largest = max((np.abs(v).max(initial=0) for v in values), default=0)
     if not largest:
         return units[0]

@@ -17,10 +17,7 @@ UPLIFTS = ["imposed", "drained", "cracked", "flow"]
 
 @pytest.mark.parametrize(
     "shape",
-    [
-        {"batter": 5, "batter_height": 35},
-        {"batter": 4, "batter_height": 20, "joint_height": 8},
-    ],
+    [{"batter": 5, "batter_height": 35}, {"batter": 4, "batter_height": 20, "joint_height": 8}],
 )
 def test_resultants_of_zangar_and_of_the_weight_of_silt(solve, shape):
     """Those of the gravity method."""

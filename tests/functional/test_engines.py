@@ -123,13 +123,7 @@ def test_the_tangent_is_the_derivative(law_name, works):
     """Central differences, away from kinks of the law."""
     settings = (
         works
-        | {
-            "sigma_max": 1e4,
-            "pena_tang": 1e11,
-            "pena_rupture": -1.0,
-            "G_f": 2e-4,
-            "G_t": 1e-5,
-        }
+        | {"sigma_max": 1e4, "pena_tang": 1e11, "pena_rupture": -1.0, "G_f": 2e-4, "G_t": 1e-5}
         | OWN.get(law_name, {})
     )
     case = load("ssnp142", settings | {"law": law_name}, [0.0] * 200)
@@ -209,11 +203,7 @@ SECTIONS = {
     "drains, overtopped": ({"uplift": "drained", "joint_slope": 3.0}, "20,46.5", "0,5"),
     "drains, USBR": ({"uplift": "drained", "drain_reference": "reservoir"}, "20,45", "0,5"),
     "Zangar, silt's weight": (STEEP | HEAVY_SILT, "20,41,41", "0"),
-    "Zangar, lift": (
-        SHAPE | HEAVY_SILT | {"joint_height": 8.0, "law": "rupture"},
-        "20,41,47",
-        "0",
-    ),
+    "Zangar, lift": (SHAPE | HEAVY_SILT | {"joint_height": 8.0, "law": "rupture"}, "20,41,47", "0"),
     "cracked": ({"uplift": "cracked", "law": "rupture", "sigma_max": 1e5}, "20,40,45", "0,0,5"),
     "cracked bond": ({"uplift": "cracked", "law": "bond", "joint_slope": 2.0}, "20,40,46", "0"),
     "endo, flow": ({"law": "endo", "uplift": "flow"}, "30,41", "2"),
@@ -552,8 +542,7 @@ def test_runs_of_both_engines_agree_on_water_in_time(scene, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "settings",
-    [{"drains": 1.0}, {"joint_slope": 3.0}, {"pressure_step": 1e4}, {"drive": "heel"}],
+    "settings", [{"drains": 1.0}, {"joint_slope": 3.0}, {"pressure_step": 1e4}, {"drive": "heel"}]
 )
 def test_water_in_time_that_one_engine_can_not_compute_is_refused(settings):
     case = load("dam", {"uplift": "flow", "time_unit": 60.0} | settings, (30.0, 40.0))

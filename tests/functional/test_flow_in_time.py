@@ -23,11 +23,7 @@ OPENS = {"law": "friction", "adhesion": 0.0, "mu": 1.5, "dam_base": 28.0, "n_joi
 #: Two blocks on bases of 10 and 5 m; the joint between them and, if it is dry, the second base end
 #: the water's path.
 BLOCKS = {"left": (0, 0, 10, 10), "right": (10, 0, 15, 10)}
-JOINTS = {
-    "left base": (0, 0, 10, 0),
-    "right base": (10, 0, 15, 0),
-    "contraction": (10, 10, 10, 0),
-}
+JOINTS = {"left base": (0, 0, 10, 0), "right base": (10, 0, 15, 0), "contraction": (10, 10, 10, 0)}
 STIFF = {"law": "friction", "adhesion": 1e30, "pena_tang": 0.0, "E": 2e10, "order": 1.0}
 
 
@@ -58,8 +54,7 @@ def opened(model, sizes):
     for joint, size in zip(model.equilibrium.interface.joints, sizes, strict=True):
         size = size(joint.space.locations) if callable(size) else size
         wanted = np.outer(
-            np.broadcast_to(size, len(joint.space.locations)),
-            joint.surface.normals[0][: joint.dim],
+            np.broadcast_to(size, len(joint.space.locations)), joint.surface.normals[0][: joint.dim]
         )
         jump += np.linalg.lstsq(joint.unknowns.toarray(), wanted.ravel(), rcond=None)[0]
     return jump

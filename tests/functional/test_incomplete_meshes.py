@@ -151,10 +151,7 @@ REFUSED = {
     "crest": (without("crest"), "no region crest"),
     "fixed": (without("fixed"), "no region fixed"),
     "half of upstream": (without("upstream", slice(None, None, 2)), "upstream: has a hole"),
-    "one of upstream": (
-        without("upstream", [2]),
-        "upstream: has a hole; 1 element is in",
-    ),
+    "one of upstream": (without("upstream", [2]), "upstream: has a hole; 1 element is in"),
     "lowest of upstream": (without("upstream", [0]), "upstream: has a hole"),
     "highest of upstream": (without("upstream", [-1]), "crest surface and upstream: has a hole"),
     "one of downstream": (without("downstream", [2]), "downstream: has a hole"),

@@ -190,11 +190,7 @@ def test_a_geo_file_is_not_run_without_run_geo(tmp_path, command, monkeypatch, n
     "name, content, message",
     [
         ("own.med", b"\x89HDF\r\n", "own.med: must be a mesh in Gmsh's format, which"),
-        (
-            "own.msh",
-            b"<xml>",
-            "own.msh: must be a mesh in Gmsh's format, which",
-        ),
+        ("own.msh", b"<xml>", "own.msh: must be a mesh in Gmsh's format, which"),
         ("own.geo", b"Point(1) = {0, 0, 0};", "is a program that Gmsh runs; if you trust it"),
         *((f"own.{kind}", b"", "is empty") for kind in ("msh", "med", "geo")),
     ],

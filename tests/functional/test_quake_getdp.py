@@ -24,10 +24,7 @@ SOLID = {"dim": 3.0, "thickness": 7.0, "hold_z": 1.0, "mesh_pattern": "split"}
 SOLID |= {"n_joint": 6.0, "h_dam": 15.0, "h_found": 45.0}
 BATTER = {"batter": 4.0, "batter_height": 20.0}
 DRAINS = {"drains": 1.0, "drain_x": 5.0}
-SCENES = {
-    "bond": BOND,
-    "rupture": {"law": "rupture", "sigma_max": 2e5},
-}
+SCENES = {"bond": BOND, "rupture": {"law": "rupture", "sigma_max": 2e5}}
 #: Further laws, meshes, water, damping, sections; and steps that are halved.
 MORE = {
     "friction": {},

@@ -401,10 +401,7 @@ def test_within_the_range_of_moduli_a_dam_stands(modulus):
 @pytest.mark.parametrize(
     "words, message",
     [
-        (
-            "lift_heights=1e-9",
-            "lift_heights = 1e-09: each must be at least 4.5e-05 m (1e-06 of",
-        ),
+        ("lift_heights=1e-9", "lift_heights = 1e-09: each must be at least 4.5e-05 m (1e-06 of"),
         ("lift_heights=1e-9,20", "lift_heights = 1e-09,20: each must be at least 4.5e-05 m"),
         ("lift_heights=20,20.00000001", "must increase from above the first joint"),
         ("lift_heights=44.99999999", "and below the crest"),

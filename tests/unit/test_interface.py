@@ -120,10 +120,7 @@ def test_pressures_derivatives(interface):
     rng = np.random.default_rng(142)
     (joint,) = interface.joints
     flow, weights = joint.flow, joint.points.weights
-    jump, imposed = (
-        rng.normal(1, 0.3, len(interface.bulk.stiffness)),
-        9e4 * (1 - joint.fields.xi),
-    )
+    jump, imposed = (rng.normal(1, 0.3, len(interface.bulk.stiffness)), 9e4 * (1 - joint.fields.xi))
 
     def pressure(jump, imposed=imposed):
         opening = np.maximum(flow.opening @ jump, 0)

@@ -81,8 +81,7 @@ def filled(section, still, level, tail=0.0, **settings):
 
 
 @pytest.mark.parametrize(
-    "level, held",
-    [(0, 0), (2, 2 * (5 + 2 / 8)), (6, 6 * (5 + 6 / 8)), (9, 8 * (5 + 1) + 5 + 2)],
+    "level, held", [(0, 0), (2, 2 * (5 + 2 / 8)), (6, 6 * (5 + 6 / 8)), (9, 8 * (5 + 1) + 5 + 2)]
 )
 @pytest.mark.parametrize("on_crest", [0, 1])
 def test_area_of_water_up_to_a_level(lift, level, held, on_crest):

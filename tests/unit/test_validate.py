@@ -66,10 +66,7 @@ def test_difference_is_relative_to_the_reference():
 
 
 def test_the_report_counts_the_verdicts():
-    rows = [
-        validation.Comparison(REFERENCE, 2e-7),
-        validation.Comparison(REFERENCE, 3e-7),
-    ]
+    rows = [validation.Comparison(REFERENCE, 2e-7), validation.Comparison(REFERENCE, 3e-7)]
     text = validation.report(rows)
     assert "1 passed, 1 failed; the worst uses 5000%" in text
     assert "+50.00 %" in text

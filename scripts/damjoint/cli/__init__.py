@@ -31,9 +31,7 @@ EXIT_CODES = """exit codes:
 
 
 def parser(word: str = "") -> Parser:
-    """Return the parser of the command: of all commands, or of the one that the first word of the
-    command line names.
-    """
+    """Return the parser of the command that the first word names, or of all commands."""
     chosen = [name for name in (*COMMANDS, *DEVELOPERS) if name == word] or [*COMMANDS, *DEVELOPERS]
     modules = {name: import_module(f".{name}", __name__) for name in chosen}
     of_developers = (f"  {n:<11}  {modules[n].SUMMARY}" for n in DEVELOPERS if n in modules)

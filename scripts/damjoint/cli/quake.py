@@ -47,9 +47,7 @@ def add(command: Parser) -> None:
 
 
 def call(arguments: argparse.Namespace) -> int:
-    """Run damjoint quake; 1 if the dam does not stand after an earthquake, or if that is not
-    known.
-    """
+    """Run damjoint quake; 1 unless the dam is known to stand after each earthquake."""
     from ..studies import quake_getdp
     from ..studies.quake_result import text
     from ..studies.quake_study import Options, check, records_table, run_records

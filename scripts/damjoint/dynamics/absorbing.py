@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from .. import InputError
+from .. import require
 from ..arrays import Array, Sparse
 from ..fem.bodies import Bodies
 from ..fem.elasticity import elasticity, lame, mass
@@ -34,21 +34,15 @@ def check(case: Case) -> None:
     """Raise InputError if the rock of a case can not have mass but should."""
     if not case["rock_mass"]:
         return
-    if case.geometry:
-        raise InputError(
-            f"rock_mass = 1: must be 0 with a geometry of one's own ({case.geometry}): the record "
-            "enters through level rock"
-        )
-    if case["rho_found"] == 0:
-        raise InputError("rho_found = 0: must be > 0 with rock_mass = 1")
-    if case["dim"] == 3 and not case["hold_z"]:
-        raise InputError("hold_z = 0: must be 1 with rock_mass = 1: the waves are plane")
+    why = f"({case.geometry}): the record enters through level rock"
+    require(not case.geometry, "rock_mass", 1, f"be 0 with a geometry of one's own {why}")
+    require(case["rho_found"], "rho_found", 0, "be > 0 with rock_mass = 1")
+    held = case["dim"] == 2 or case["hold_z"]
+    require(held, "hold_z", 0, "be 1 with rock_mass = 1: the waves are plane")
 
 
 def wave_speeds(case: Case) -> Array:
-    """Speeds (2,) [m/s] of the waves with horizontal and vertical motion that travel vertically:
-    c_s and c_p.
-    """
+    """Speeds (2,) [m/s] of vertical waves of horizontal and vertical motion: c_s and c_p."""
     lam, mu = lame(case["E_found"], case["nu_found"])
     return np.sqrt(np.array([mu, lam + 2 * mu]) / case["rho_found"])
 

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .. import ROUND_OFF, InputError
+from .. import ROUND_OFF, InputError, require
 from ..arrays import Array, IntArray
 from ..input.case import Case
 from ..input.parameters import TINY
@@ -55,11 +55,9 @@ class Record:
                 'record: must be set, record = "FILE.csv"; in the case, or --record FILE.csv'
             )
         file = read(case.record, case.record_vertical)
-        if not file.in_si and case["record_unit"] == "unstated":
-            raise InputError(
-                "record_unit = unstated: must be m/s2 or g, the unit of the accelerations in "
-                f"{case.record}"
-            )
+        stated = file.in_si or case["record_unit"] != "unstated"
+        rule = f"be m/s2 or g, the unit of the accelerations in {case.record}"
+        require(stated, "record_unit", "unstated", rule)
         rows, lines = file.rows, file.lines
         unit = STANDARD_GRAVITY if case["record_unit"] == "g" and not file.in_si else 1.0
         parts = {"both": (1, 1), "horizontal": (1, 0), "vertical": (0, 1)}
@@ -67,22 +65,16 @@ class Record:
         start, rest = case["record_start"], case["record_rest"]
         times, acceleration = rows[:, 0], rows[:, 1:] * scale
         large = np.flatnonzero(np.abs(acceleration).max(axis=1) > LARGEST * case["g"])
+        scaled = f"record_scale = {case['record_scale']:g}"
         if len(large):
-            raise InputError(
-                f"record = {case.record}, row {lines[large[0]]}: must be at most {LARGEST:g} g "
-                f"(record_unit = {case['record_unit']}, record_scale = {case['record_scale']:g})"
-            )
-        if not times[0] <= start < times[-1]:
-            raise InputError(
-                f"record_start = {start:g}: must be >= {times[0]:g} and < {times[-1]:g} s, the "
-                f"times of {case.record}"
-            )
-        if not acceleration.any():
-            raise InputError(
-                f"record = {case.record}: must have an acceleration other than zero "
-                f"(record_component = {case['record_component']}, record_scale = "
-                f"{case['record_scale']:g})"
-            )
+            limit = f"{LARGEST:g} g (record_unit = {case['record_unit']}, {scaled})"
+            row = f"{case.record}, row {lines[large[0]]}"
+            raise InputError(f"record = {row}: must be at most {limit}")
+        rule = f"be >= {times[0]:g} and < {times[-1]:g} s, the times of {case.record}"
+        require(times[0] <= start < times[-1], "record_start", start, rule)
+        component = f"record_component = {case['record_component']}"
+        rule = f"have an acceleration other than zero ({component}, {scaled})"
+        require(acceleration.any(), "record", str(case.record), rule)
         interval = float(np.diff(times).min())
         check_steps(case, times, lines)
         first = at(times, acceleration, start)
@@ -120,9 +112,7 @@ class Record:
         return at(self.times, self.acceleration, time)
 
     def velocity(self, times: Array) -> Array:
-        """Velocity along x and y (n, 2) [m/s] at times (n,): the integral of the acceleration, zero
-        before the record.
-        """
+        """Velocity along x and y (n, 2) [m/s] at times (n,), zero before the record."""
         row = np.clip(np.searchsorted(self.times, times, "right") - 1, 0, None)
         since = np.maximum(times - self.times[row], 0)[:, None]
         mean = (self.acceleration[row] + at(self.times, self.acceleration, times)) / 2
@@ -170,8 +160,7 @@ def check_steps(case: Case, times: Array, lines: IntArray) -> None:
     limit = f"the shortest interval of {case.record}"
     if shortest < typical * (1 - DIGITS):
         limit += f" (before row {lines[k + 1]}; half of its intervals are >= {typical:g} s)"
-    if dt > shortest * (1 + DIGITS):
-        raise InputError(f"dt = {dt:g}: must be <= {shortest:g} s, {limit}")
+    require(dt <= shortest * (1 + DIGITS), "dt", dt, f"be <= {shortest:g} s, {limit}")
     duration = float(times[-1]) - case["record_start"]
     step = shortest / 2 if dt == -1 else dt
     number = (duration + rest) / max(step, TINY)
@@ -192,9 +181,7 @@ def check_steps(case: Case, times: Array, lines: IntArray) -> None:
 
 
 def integral(times: Array, acceleration: Array) -> Array:
-    """Velocity (n, 2) [m/s] at the times (n,) of an acceleration (n, 2) that is linear between
-    them, from rest.
-    """
+    """Velocity (n, 2) [m/s] at times (n,) of a piecewise linear acceleration (n, 2), from rest."""
     means = (acceleration[1:] + acceleration[:-1]) / 2
     return np.vstack([np.zeros(2), np.cumsum(np.diff(times)[:, None] * means, axis=0)])
 

@@ -109,9 +109,7 @@ class System:
         return self.rigid_motion(joint, above, uniform(np.array([*along, 0.0])))
 
     def rigid_motion(self, joint: JointInterface, above: Collection[str], motion: Motion) -> Array:
-        """The unknowns (n,) of a rigid motion of the bodies of these names, which a joint separates
-        from the others.
-        """
+        """The unknowns (n,) of a rigid motion of named bodies that a joint parts from others."""
         result = np.zeros(self.size)
         moving = sorted(self.motion, key=lambda name: name not in above)
         # the others last: shared degrees of freedom are those of the lower body

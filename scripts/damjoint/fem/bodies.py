@@ -16,14 +16,7 @@ from ..input.scene import LINES, MATERIALS, POINT, TRACTION
 from ..mesh.body import Body
 from ..mesh.mesh import Mesh, mesh_of
 from ..model.loads import COMPLETE, across, thermal_strains, wet
-from .elasticity import (
-    Distribution,
-    Material,
-    at_middles,
-    body_force,
-    elasticity,
-    thermal_load,
-)
+from .elasticity import Distribution, Material, at_middles, body_force, elasticity, thermal_load
 from .elements import WATER, Space, points_of
 
 #: Weights that act, region and component: concrete also along x (earthquake).

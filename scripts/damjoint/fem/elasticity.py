@@ -115,9 +115,7 @@ def affine(points: Array, cells: IntArray, nodal_gradients: Array) -> bool:
 
 
 def body_force(space: Space, dim: int, component: int, region: str | None = None) -> Array:
-    """Load vector of a unit force density along a component [m3 per function], in one region of the
-    body or in all.
-    """
+    """Load vector of a unit force density along a component [m3 per function]; region: or all."""
     points = points_of(space, BULK[space.order])
     load = np.zeros((len(space.locations), dim))
     load[:, component] = points.values.T @ (points.weights * inside(space, region)[points.elements])

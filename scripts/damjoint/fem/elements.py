@@ -203,10 +203,7 @@ JOINT = {
 #: For water pressure and other loads on surfaces and lines.
 WATER = {"vertex": 1, "line": 4, "triangle": 6, "quad": 16}
 #: On wet faces, by parameter `face_points`; as on a side of a triangle, the rule of like degree.
-SIDE_POINTS = {
-    2: {"line": 2, "triangle": 3, "quad": 4},
-    4: {"line": 4, "triangle": 6, "quad": 16},
-}
+SIDE_POINTS = {2: {"line": 2, "triangle": 3, "quad": 4}, 4: {"line": 4, "triangle": 6, "quad": 16}}
 
 
 @cache
@@ -256,9 +253,7 @@ class Space:
         return np.concatenate([nodes, len(self.body.points) + products])
 
     def at_locations(self, u: Array) -> Array:
-        """Displacement (..., locations, 3) at the locations, from the factors (..., n, dim) of the
-        functions.
-        """
+        """Displacement (..., locations, 3) at the locations, from factors (..., n, dim)."""
         matrix = self.interpolation(self.order)
         rows = u.reshape(-1, *u.shape[-2:])
         values = np.array([matrix @ row for row in rows]).reshape(u.shape)

@@ -50,9 +50,7 @@ INSTALLED = Path(sys.prefix) / "lib" / "damjoint"
 
 @cache
 def library() -> ctypes.CDLL | None:
-    """mumps.c as a library, of `make setup` or compiled into the cache folder; None without
-    compiler or MUMPS.
-    """
+    """mumps.c as a library, by `make setup` or compiled into the cache; None: it can not be."""
     parent = cache_folder() or Path(tempfile.mkdtemp(prefix="damjoint"))
     for folder in (INSTALLED, parent):
         # OSError: not compiled yet, or for a MUMPS that is no longer installed

@@ -56,9 +56,7 @@ class Gluing:
 
     @staticmethod
     def of(bodies: Bodies) -> Gluing:
-        """Glue bodies; jumps that are fixed in the body above, or at a tip inside a body, are no
-        unknowns.
-        """
+        """Glue bodies; jumps fixed in the body above, or at a tip in a body, are no unknowns."""
         names = list(bodies.by_name)
         sizes = [body.stiffness.shape[0] for body in bodies.by_name.values()]
         first = dict(zip(names, np.cumsum([0, *sizes[:-1]]), strict=True))

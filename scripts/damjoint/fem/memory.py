@@ -80,9 +80,7 @@ def dense_memory(unknowns: int) -> float:
 
 
 def sizes(case: Case) -> str:
-    """What a computation begins with, for the line of its progress: it may take long without a
-    step.
-    """
+    """What a computation begins with, for the line of its progress: it may take long."""
     if case.geometry:
         return f"{case.name}, mesh and elimination of the bodies"
     joints = joints_size(case)
@@ -164,9 +162,7 @@ def kilobytes(path: str, name: str) -> float:
 
 
 def check_memory(needed: float, what: str) -> None:
-    """Raise RunError if more memory [bytes] is needed than is available; what: the unknowns, for
-    the message.
-    """
+    """Raise RunError if more memory [bytes] is needed than available; what: unknowns, in words."""
     if needed > available():
         raise RunError(
             f"memory: {what} need about {needed / 1e9:.1f} GB, {available() / 1e9:.1f} GB are "

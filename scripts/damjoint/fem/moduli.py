@@ -45,9 +45,7 @@ class Moduli:
 
     @property
     def known(self) -> bool:
-        """Whether the bodies that are known have the same faces under water: those of a search for
-        a level may have more.
-        """
+        """Whether the known bodies have the same wet faces: a search's may have more."""
         return all(one.pressure.shape == self.bulk.pressure.shape for one in self.sides)
 
     def changed(self, dam: float, found: float) -> Condensed:

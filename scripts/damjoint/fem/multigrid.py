@@ -276,9 +276,7 @@ def block_inverse(matrix: Sparse, node: IntArray) -> Sparse:
 def largest_eigenvalue(
     scaled: Callable[[Array], Array], product: Callable[[Array], Array], size: int
 ) -> float:
-    """The largest eigenvalue of `scaled` after `product`, of vectors (size,), by the power method,
-    raised a little.
-    """
+    """The largest eigenvalue of `scaled` after `product`, by the power method, raised a little."""
     x: Array = single(np.random.default_rng(0).random(size) - 0.5)
     for _ in range(POWER_ITERATIONS):
         x = scaled(product(x / np.linalg.norm(x)))

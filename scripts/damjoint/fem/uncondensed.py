@@ -68,9 +68,7 @@ def rigid_motions(body: ElasticBody) -> Array:
 
 
 class Numbering:
-    """Numbers of the degrees of freedom of all bodies: one after the other, and those that are free
-    among the unknowns.
-    """
+    """Numbers of all bodies' degrees of freedom, and of the free ones among the unknowns."""
 
     def __init__(self, bodies: Bodies) -> None:
         self.bodies = bodies.by_name
@@ -165,10 +163,7 @@ def uncondensed(case: Case, bodies: Bodies) -> Uncondensed:
         ],
         faces={n: face for n, face in mesh.faces.items() if n in dof_of_face},
         factorisation="none: smoothed aggregation",
-        seconds={
-            "mesh": mesh.seconds,
-            "assembly": bodies.seconds + time.perf_counter() - start,
-        },
+        seconds={"mesh": mesh.seconds, "assembly": bodies.seconds + time.perf_counter() - start},
         numbers={name: numbering.unknown[numbering.of_body(name)] for name in by_name},
         body=np.repeat(np.arange(len(by_name)), numbering.sizes)[numbering.free],
         node=numbering.nodes(glued),

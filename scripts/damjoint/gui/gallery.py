@@ -121,9 +121,7 @@ class Gallery:
         self.balance(step)
 
     def balance_about_zero(self, tag: int, largest: np.ndarray, common: bool) -> None:
-        """Give a view a color scale with zero in the middle; largest: absolute value of each step;
-        common: whether all steps have the same scale.
-        """
+        """Color scale with zero in the middle; largest: of each step; common: one for all steps."""
         self.balanced[tag] = np.maximum(
             largest.max() if common else largest, TINY * np.ones_like(largest)
         )

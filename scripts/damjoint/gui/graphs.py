@@ -154,9 +154,7 @@ class Graphs:
         x_axis: tuple[Scale, tuple[float, float]],
         scales: list[Scale],
     ) -> None:
-        """Draw grid, box with a line at zero, and texts of a graph with its top left corner at a
-        place.
-        """
+        """Draw grid, box with a line at zero, and texts of a graph, its top left at a place."""
         (x, y), (width, height) = place, self.layout.graph_size
         across, (left, right) = x_axis
         low, high = extent(np.array([0.0, INTERVALS]))
@@ -263,9 +261,7 @@ PITCH, BEND = 0.06, 0.02
 
 
 def thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Leave out points of a dense curve, x (n,) and y (steps, n): many lines shorter than a few
-    pixels are drawn with gaps.
-    """
+    """Thin a dense curve, x (n,) and y (steps, n): lines shorter than some pixels have gaps."""
     before, after = np.diff(x)[:-1], np.diff(x)[1:]
     share = np.divide(before, before + after, out=np.zeros_like(before), where=before + after > 0)
     bends = np.abs(y[:, 1:-1] - y[:, :-2] - share * (y[:, 2:] - y[:, :-2])).max(axis=0) > BEND

@@ -54,9 +54,7 @@ class SolvedScene:
 
     @staticmethod
     def of(outcome: Outcome) -> list[SolvedScene]:
-        """The scenes of an outcome, one for each joint, that of the decisive joint first; computes
-        the bodies' fields.
-        """
+        """The scenes of an outcome, one a joint, the decisive one first; computes the fields."""
         result, (state, _) = outcome.result, early_end(outcome.result, outcome.error)
         bodies, fields, times = outcome.mesh().bodies, outcome.fields(), times_of(result)
         message = statement(result)

@@ -278,9 +278,7 @@ class Deformed:
         return labels
 
     def resultant(self) -> Pieces:
-        """Resultant of the shown joint's forces without the water in it, and the joint's middle
-        third.
-        """
+        """Resultant of the shown joint's forces without its water, and the joint's middle third."""
         joint, size = self.scene.joints[self.solved.joint], self.scene.case.size
         third = self.scene.middle_third(joint) - [0, THIRD * size, 0]
         lines = arrows(*self.scene.resultant(joint), RESULTANT * size)

@@ -135,9 +135,7 @@ def check_request(request: Request) -> Sheet:
 
 
 def fill_database(request: Request, case: Case) -> None:
-    """Put the parameters of a request, which gives a case, into the ONELAB database: of several
-    joints those of the first one.
-    """
+    """Put a request that gives a case into the ONELAB database, with the first joint's values."""
     file = casefile.read(case_file(request.case))
     settings: dict[str, Setting] = {**file.defaults, **file.of_joints}
     settings |= first_block(case)

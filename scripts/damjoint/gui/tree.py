@@ -376,9 +376,7 @@ class Tree:
         )
 
     def in_window_words(self, message: str) -> str:
-        """A message on a value by the label of its field, beside which it is written, too; any
-        other message as it is.
-        """
+        """A message on a value by its field's label, and beside the field; others as they are."""
         self.clear_error()
         match = re.fullmatch(ON_VALUE, message)
         names = FIELDS_OF_NAMES | {name: known.label for name, known in self.known.items()}

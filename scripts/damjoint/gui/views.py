@@ -218,9 +218,7 @@ def passed(scene: SolvedScene, time: float) -> str:
 
 
 def show_deformed(gallery: Gallery, deformed: Deformed, display: Display) -> list[Entry]:
-    """Show dam and foundation, outline, loads, crack and slip, all displaced by one factor; returns
-    their legend.
-    """
+    """Show bodies, outline, loads, crack and slip, displaced by one factor; returns a legend."""
     case = deformed.scene.case
     deformed.camera.clip(case.size)
     moves = {"VectorType": 5, "Clip": CLIPPED, "DisplacementFactor": deformed.scale}

@@ -393,9 +393,7 @@ class Session:
         return bool(self.scenes) and tree.get_text(tree.VERDICT) != tree.NOT_RUN
 
     def fit_view(self) -> None:
-        """Position what is shown in the drawing area if either has changed; else keep the user's
-        view.
-        """
+        """Position what is shown if it or its area has changed; else keep the user's view."""
         if self.shows_results:
             scene = self.scenes[self.scene_shown]
             camera = result_camera(scene.result.case, scene.bodies)

@@ -171,9 +171,7 @@ def run_quake(sheet: Sheet, pipe: Connection, stop: Stop) -> tuple[list[SolvedSc
 
 
 class Live:
-    """Sends the scenes of an earthquake while it is computed: after LIVE seconds, and so seldom
-    that it takes a fifth of the time.
-    """
+    """Sends the scenes of an earthquake after LIVE seconds, in a fifth of the time at most."""
 
     def __init__(self, pipe: Connection) -> None:
         self.pipe, self.next, self.frames = pipe, time.perf_counter() + LIVE, 1

@@ -15,14 +15,7 @@ import numpy as np
 from .. import InputError, require
 from ..laws import LAWS
 from .parameters import constants, declared
-from .values import (
-    ParameterValues,
-    flows,
-    flows_in_time,
-    has_drains,
-    has_point,
-    level_unknown,
-)
+from .values import ParameterValues, flows, flows_in_time, has_drains, has_point, level_unknown
 
 #: Usual values, from and to, in SI units: a density of 24 kN/m3 or a strength of 0.2 MPa without
 #: its unit is none.
@@ -289,9 +282,7 @@ def downstream_corners(case: ParameterValues, face: Sequence[float]) -> list[tup
 
 
 def check_joints_on_face(
-    case: ParameterValues,
-    face: Sequence[float],
-    sections: Sequence[Mapping[str, Sequence[float]]],
+    case: ParameterValues, face: Sequence[float], sections: Sequence[Mapping[str, Sequence[float]]]
 ) -> None:
     """Joints of a section with corners of the downstream face as in `check_downstream_face`: the
     line of a joint meets the face only at its toe. sections: of each joint.

@@ -53,9 +53,7 @@ MESH = b"$MeshFormat"
 
 
 def is_mesh(path: Path) -> bool:
-    """Whether Gmsh reads a file as data: it unpacks and runs a file of unknown format as a .geo,
-    whatever its name.
-    """
+    """Whether Gmsh reads a file as data: it runs one of unknown format, whatever its name."""
     try:
         with path.open("rb") as file:
             return path.suffix == ".msh" and file.read(len(MESH)) == MESH
@@ -68,9 +66,7 @@ INCLUDES = r"\b(?:Include|Merge)\s+\"([^\"]*)\""
 
 
 def files_of(path: Path, known: dict[Path, str]) -> dict[Path, str]:
-    """A .geo file and those that it includes, but for the declarations, with their text; added to
-    those that are known.
-    """
+    """Add the texts of a .geo file and of those that it includes, but for the declarations."""
     if path in known or data("pro").resolve() in path.resolve().parents or not path.is_file():
         return known
     known[path] = path.read_text(errors="replace")

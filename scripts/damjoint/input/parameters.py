@@ -266,9 +266,7 @@ def declarations() -> list[Parameter]:
 
 
 def declaration(name: str, rest: str, default: str, label: str, entry: dict[str, Any]) -> Parameter:
-    """A parameter from the rest of its declaration, its default, its label and its entry in the
-    ONELAB database.
-    """
+    """A parameter from the rest of its declaration, default, label and ONELAB entry."""
     group, description, unit = re.findall(LABEL, label)[0]
     # Min is -1 for a parameter that may be -1
     otherwise = entry.get("attributes", {}).get("Otherwise")
@@ -454,8 +452,6 @@ def listing(name: str, values: Iterable[float]) -> str:
 
 
 def in_rows(texts: Sequence[str], number: int = 8, separator: str = ",") -> str:
-    """Texts of that language, a number of them on each line: GetDP's parser fails on lines of some
-    thousand characters.
-    """
+    """Texts of that language, some a line: GetDP fails on lines of some thousand characters."""
     rows = (texts[i : i + number] for i in range(0, len(texts), number))
     return f"{separator}\n".join(f"{separator} ".join(row) for row in rows)

@@ -140,9 +140,7 @@ def loading_lists(
 
 
 def check_geometry(geometry: Path, face: Sequence[float], accuracy: str | None) -> None:
-    """Raise InputError if a geometry of one's own has a downstream face or an accuracy that it can
-    not have.
-    """
+    """Raise InputError if a user's own geometry has a downstream face or can not be refined."""
     if face:
         raise InputError(
             "downstream_face: must not be set for a geometry of one's own, whose mesh has the faces"

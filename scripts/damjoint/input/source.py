@@ -28,9 +28,7 @@ class Source:
     accuracy: str | None = None
 
     def check_lists(self, joints: Sequence[str]) -> None:
-        """Raise InputError if a list has not one value for each joint of a geometry, by their
-        names.
-        """
+        """Raise InputError if a list has not one value for each named joint of a geometry."""
         overrides = {name: checked(name, value) for name, value in self.overrides.items()}
         for name, values in lists_of_joints({**self.text.of_joints, **overrides}).items():
             if len(values) != len(joints):

@@ -31,9 +31,7 @@ TextName: TypeAlias = Literal[
 
 
 class ParameterValues:
-    """The values of all parameters, those that follow others resolved: a mapping, whose values are
-    attributes, too.
-    """
+    """The values of all parameters, automatic ones resolved: a mapping, also by attributes."""
 
     values: dict[str, Value]
 
@@ -116,9 +114,7 @@ def has_drains(values: Values | ParameterValues) -> bool:
 
 
 def freezes_uplift(values: Values | ParameterValues) -> bool:
-    """Whether the water pressure in the joint during a pseudo-static earthquake follows from the
-    joint before it.
-    """
+    """Whether a joint's pressure in a pseudo-static earthquake follows from the joint before it."""
     mode, uplift = values["quake_uplift"], values["uplift"]
     if uplift == "none" or not (values["k_h"] or values["k_v"]):
         return False

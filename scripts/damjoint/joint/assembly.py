@@ -48,9 +48,7 @@ class Assembly:
         return self.stiffness(tangent, np.arange(self.number))
 
     def change(self, tangent: Array, before: Array) -> tuple[CsrMatrix, IntArray]:
-        """The change of the stiffness from one tangent to another (q, 3, 3), without its zero rows,
-        and the rows.
-        """
+        """The change from one tangent to another (q, 3, 3), without its zero rows, and the rows."""
         # rows: components of the traction
         differs = (tangent != before).any(axis=2)[:, : self.dim]
         points = np.flatnonzero(differs.any(axis=1))

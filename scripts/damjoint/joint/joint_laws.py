@@ -112,9 +112,7 @@ class JointLaws:
     def evaluate(
         self, jump: Array, variables: JointVariables, releasing: BoolArray | None = None
     ) -> tuple[Array, Array]:
-        """Traction (q, 3) and tangent (q, 3, 3); releasing: points (q,) that are placed inside the
-        release of their shear, see `Law.evaluate`.
-        """
+        """Traction (q, 3) and tangent (q, 3, 3); releasing: points (q,), see `Law.evaluate`."""
         inside: list[Any] = [None] * len(self.laws)
         if releasing is not None:
             inside = variables.split(releasing)

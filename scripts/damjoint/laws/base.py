@@ -124,17 +124,13 @@ class Law(Generic[V]):
         return np.zeros(len(jump), int)
 
     def shear_release(self, jump: Array, variables: V) -> tuple[Array, Array]:
-        """Shear stress (q, 2) on the line of the release, wherever a point is, and its derivative
-        with the opening (q, 2).
-        """
+        """Shear stress (q, 2) on the line of the release, and its derivative by opening (q, 2)."""
         raise NotImplementedError
 
     def evaluate(
         self, jump: Array, variables: V, releasing: BoolArray | None = None
     ) -> tuple[Array, Array]:
-        """Traction and tangent; releasing: points (q,) placed inside the release of their shear,
-        see `shear_release`.
-        """
+        """Traction and tangent; releasing: points (q,) within `shear_release`."""
         traction, tangent = self.traction_and_tangent(jump, variables)
         if releasing is not None and releasing.any():
             shear, slope = self.shear_release(jump, variables)
@@ -193,9 +189,7 @@ class Law(Generic[V]):
     # -- strength
 
     def shear_strength(self, sigma_n: Array, damage: Array | float, slip: Array | float) -> Array:
-        """Largest shear stress (q,) [Pa] at an effective normal stress, damage and slip [m];
-        infinite without a bound.
-        """
+        """Largest shear stress (q,) [Pa] at a normal stress, damage, slip [m]; or infinite."""
         return np.full(np.shape(sigma_n), np.inf)
 
     def tension_left(self, damage: Array) -> Array:

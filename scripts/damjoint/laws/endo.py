@@ -172,9 +172,7 @@ class Endo(SofteningLaw[EndoVariables]):
         return np.asarray(compliance)
 
     def plastic_return(self, jump: Array, variables: EndoVariables, alpha: Array) -> PlasticReturn:
-        """The plastic jump that minimises the energy at a damage (q,), and what one unit of damage
-        then releases.
-        """
+        """The plastic jump of least energy at a damage (q,), and what a unit of damage releases."""
         S, dS, d2S = degradation(np.maximum(alpha, LEAST))
         before = variables.plastic[:, [2, 0, 1]]
         flow = self.flow(self.elastic_trial(jump, before, S), S)

@@ -114,9 +114,7 @@ class Rupture(SofteningLaw[RuptureVariables]):
         return np.asarray(jump[:, 0] - self.added_thickness(variables, len(jump)))
 
     def added_thickness(self, variables: RuptureVariables, points: int) -> Array:
-        """See `Law`; a joint that is only sawn loses the thickness of the saw less its opening
-        before.
-        """
+        """See `Law`; a joint that is only sawn loses the saw's thickness less its opening."""
         v = variables
         added = v.thickness - v.sawn if self.grout else -np.maximum(v.sawn - v.thickness, 0)
         return np.full(points, added)

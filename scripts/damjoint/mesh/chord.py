@@ -12,9 +12,7 @@ from .joint_mesh import JointMesh
 
 @dataclass(frozen=True, kw_only=True)
 class Chord:
-    """The straight line from heel to toe (3D: between the means of both lines), to which resultants
-    refer, in a plane.
-    """
+    """The line from heel to toe (3D: between means), to which resultants refer in a plane."""
 
     #: unit vectors of the plane (2, 3): x and y, unless the joint faces along z; then those towards
     #: the toe and along the joint's normal

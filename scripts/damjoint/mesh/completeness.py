@@ -118,9 +118,7 @@ def check_overlaps(geometry: UserGeometry) -> None:
 
 
 def check_contacts(geometry: UserGeometry) -> None:
-    """Raise InputError if an element of a joint is no side of both bodies, or if bodies meet
-    beside the joints.
-    """
+    """Raise InputError if a joint's element is no side of both bodies, or bodies meet elsewhere."""
     names, bodies = list(geometry.solids), geometry.body_of[geometry.owners]
     first, second, numbers = neighbours(geometry.sides, bodies)
     beside = (first != second) & ~np.isin(numbers, np.concatenate(geometry.of_joints))
@@ -148,9 +146,7 @@ def check_contacts(geometry: UserGeometry) -> None:
 
 
 def check_joint(geometry: UserGeometry, joint: Joint) -> None:
-    """Raise InputError if a joint is no chain of elements (2D), or connected surface (3D), that
-    heel and toe bound.
-    """
+    """Raise InputError if a joint is no chain (2D) or connected surface (3D) from heel to toe."""
     surface = geometry.regions[joint.region]
     rows, owners = (list(part) for part in side_tags(surface))
     heel, toe = (element_node_tags(geometry.regions[end]) for end in (joint.heel, joint.toe))
@@ -210,9 +206,7 @@ def check_rim(geometry: UserGeometry, joint: Joint) -> None:
 
 
 def check_connected(geometry: UserGeometry) -> None:
-    """Raise InputError if a part of a body is connected to no joint, or a part of the rock is
-    not held.
-    """
+    """Raise InputError if a part of a body has no joint, or a part of the rock is not held."""
     in_joints = np.isin(geometry.sides, np.concatenate(geometry.of_joints))
     first, second, _ = neighbours(geometry.sides[~in_joints], geometry.owners[~in_joints])
     part = components(first, second, len(geometry.body_of))
@@ -259,9 +253,7 @@ def check_faces(geometry: UserGeometry) -> None:
 
 
 def check_directions(geometry: UserGeometry) -> None:
-    """Raise InputError if a face as a whole looks opposite to what its name says, or if the
-    rock lies above the dam.
-    """
+    """Raise InputError if a face looks opposite to its name, or the rock lies above the dam."""
     normals, sizes = geometry.surface.normals, element_sizes(geometry.surface)
     for face, numbers in zip(geometry.faces, geometry.of_faces, strict=True):
         on_face = np.isin(geometry.sides[geometry.skin], numbers)

@@ -27,9 +27,7 @@ MARKS = {
 
 
 def shares(case: Case) -> dict[str, Setting]:
-    """The parameters that the mesh of a case depends on, and the lists of its downstream face and
-    of its lifts.
-    """
+    """The parameters on which the mesh of a case depends; lists of downstream face and lifts."""
     names = [*GEOMETRY, *(n for force, needs in MARKS.items() if case[force] for n in needs)]
     values: dict[str, Setting] = {name: case[name] for name in names}
     if has_point(case):

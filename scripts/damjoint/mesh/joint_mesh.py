@@ -79,9 +79,7 @@ class JointMesh:
 
     @property
     def heel_line(self) -> tuple[Array, Array]:
-        """The two points (3,) of the heel that are farthest from its middle, on both sides; in the
-        plane both are the same.
-        """
+        """The two points (3,) of the heel farthest from its middle; in the plane the same."""
         points = self.heel.points
         along = points - points.mean(axis=0)
         first = int(np.argmax(np.linalg.norm(along, axis=1)))

@@ -60,9 +60,7 @@ def mesh_of_files(geometry: GeometryFiles) -> Mesh:
 
 
 def mesh_of(case: Case) -> Mesh:
-    """The mesh of a case; that of a user's own geometry is read again only if it is not
-    Gmsh's current mesh.
-    """
+    """The mesh of a case; a user's own geometry is read again unless it is Gmsh's current mesh."""
     if not case.geometry:
         return Mesh(case)
     files, words = state_of(case.geometry)
@@ -274,9 +272,7 @@ class Mesh:
         ]
 
     def _by_body(self, surface: Body, body: str) -> list[tuple[str, Body]]:
-        """A surface of the bodies of a kind, dam or foundation, divided by the body that it is a
-        side of.
-        """
+        """A surface of the bodies of a kind, dam or foundation, divided by its body."""
         bodies = [name for name in self.solids if name.split(" ")[0] == body]
         if not self.geometry or len(bodies) == 1:
             return [(body, surface)]
@@ -332,9 +328,7 @@ class Mesh:
         )
 
     def _turn_outwards(self) -> None:
-        """Give joint and faces their normals: the joint's from foundation to dam, a face's out of
-        its body.
-        """
+        """Give the joint normals from foundation to dam, and faces normals out of their bodies."""
         gmsh = start_gmsh()
         kinds = {kind: name for name, kind in USER_FACES.items()}
         surfaces = [("joint", joint.surface, self.solids[joint.lower]) for joint in self.joints]

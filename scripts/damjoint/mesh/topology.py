@@ -25,18 +25,14 @@ SIMPLICES_OF = {
 
 
 class Part(NamedTuple):
-    """A connected part of a surface without a name: numbers of its elements, and the names of what
-    bounds it.
-    """
+    """A connected part of a surface without a name: its elements, the names of what bounds it."""
 
     elements: IntArray
     names: frozenset[str]
 
 
 def side_tags(body: Body) -> tuple[list[IntArray], list[IntArray]]:
-    """Node tags of the sides of a body's elements, a table for each side of each shape, and the
-    numbers of the elements.
-    """
+    """Node tags of the sides of a body's elements, by side and shape, and their elements."""
     rows, owners, start = list[IntArray](), list[IntArray](), 0
     for shape, table in body.cells:
         for corners in SIDES[shape]:
@@ -178,9 +174,7 @@ def size_below(surface: Body, level: float) -> Array:
 
 
 def part_below(heights: Array) -> Array:
-    """The part of lines (n, 2) or triangles (n, 3) below 0, from the heights of their corners in
-    increasing order.
-    """
+    """The part of lines (n, 2) or triangles (n, 3) below 0, from ascending heights of corners."""
     low, middle, high = heights[:, 0], heights[:, -2], heights[:, -1]
     with np.errstate(divide="ignore", invalid="ignore"):
         if heights.shape[1] == 2:

@@ -48,9 +48,7 @@ class NamedFace(NamedTuple):
 
 
 class UserGeometry:
-    """The mesh of a user's own geometry by its regions, before bodies are cut along joints inside
-    them.
-    """
+    """The mesh of a user's own geometry by regions, before joints inside bodies are cut."""
 
     def __init__(
         self,
@@ -215,9 +213,7 @@ class UserGeometry:
 
     @property
     def coincident(self) -> str:
-        """The position that two nodes share, which do not connect what meets there; empty if there
-        are none.
-        """
+        """The position of two nodes that do not connect what meets there; empty: there are none."""
         points = self.points[1]
         whole = np.round(points / (FLAT * np.ptp(points))).astype(int)
         _, first, count = np.unique(whole, axis=0, return_index=True, return_counts=True)

@@ -88,9 +88,7 @@ CLOSED, SLIPPED, SOFTENING, BROKEN = range(4)
 
 
 def state_of(rows: Table, law: Law[Any]) -> IntArray:
-    """The state at each row of a joint's table: BROKEN, whether open or not, SOFTENING, SLIPPED,
-    CLOSED.
-    """
+    """The state at each row of a joint's table: BROKEN, also closed, SOFTENING, SLIPPED, CLOSED."""
     # a law that does not soften has damage 0 or 1: values between are means over z
     softening = (rows["damage"] > 0) & law.softens
     unbroken = np.where(rows["slip"] > 0, SLIPPED, CLOSED)
@@ -111,9 +109,7 @@ def joint_body(bodies: dict[str, Body], joint: int) -> Body:
 
 
 def joint_data(result: Results, body: Body, time: float) -> Table:
-    """The table of a joint, the only one of `result`, at its mesh nodes: OF_JOINT by name, vectors
-    along x, y, z.
-    """
+    """The table of the only joint of `result` at its mesh nodes: OF_JOINT, vectors by x, y, z."""
     rows = result.at(time)
     nearest = nearest_rows(body.points, rows)
     return {

@@ -45,9 +45,7 @@ class Loading:
 
 @dataclass(frozen=True)
 class Unknown:
-    """What of the loading is unknown under displacement control: the level [m], or the factor of a
-    load of STAGED.
-    """
+    """What is unknown under displacement control: the level [m], or the factor of a load."""
 
     load: str = "level"
 

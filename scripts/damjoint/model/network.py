@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import InputError
+from .. import InputError, require
 from ..arrays import Array, IntArray, distinct
 from ..input.case import Case
 from ..input.values import flows, flows_in_time, has_drains, level_unknown
@@ -156,28 +156,22 @@ def check(network: Network, joints: Sequence[JointMesh], cases: Sequence[Case]) 
     """Raise InputError if the joints of a network can not have one flow of water."""
     names = " and ".join(joint.name for joint in joints)
     modes = dict.fromkeys(case["uplift"] for case in cases)
-    if "drained" in modes and any(map(flows, cases)):
-        raise InputError(
-            f"uplift = {', '.join(modes)}: must not be drained in one of the joints that meet "
-            f"({names}) and flow or cracked in another; there drains = 1"
-        )
+    drained, meeting = "drained" in modes, f"joints that meet ({names})"
+    rule = (
+        f"not be drained in one of the {meeting} and flow or cracked in another; there drains = 1"
+    )
+    require(not drained or not any(map(flows, cases)), "uplift", ", ".join(modes), rule)
     no_ends = not len(network.mesh.heel_nodes) and not len(network.mesh.toe_nodes)
-    if no_ends and any(map(flows_in_time, cases)) and not cases[0]["storage"]:
-        raise InputError(
-            f"storage = 0: must be > 0 in joints without an end at the water ({names}), whose "
-            "volume could not change (no equilibrium)"
-        )
+    if no_ends and any(map(flows_in_time, cases)):
+        why = "whose volume could not change (no equilibrium)"
+        rule = f"be > 0 in joints without an end at the water ({names}), {why}"
+        require(cases[0]["storage"], "storage", 0, rule)
     effects = dict.fromkeys(c["drain_effectiveness"] for c in cases if flows(c) and has_drains(c))
-    if len(effects) > 1:
-        raise InputError(
-            f"drain_effectiveness = {', '.join(f'{value:g}' for value in effects)}: must be the "
-            f"same in joints that meet ({names})"
-        )
-    if "drained" in modes and (network.branched or (network.mesh.dim == 3 and network.in_series)):
-        raise InputError(
-            f"uplift = drained: must be another one where the joints that meet ({names}) are not "
-            "one path from heel to toe"
-        )
+    given = ", ".join(f"{value:g}" for value in effects)
+    require(len(effects) <= 1, "drain_effectiveness", given, f"be the same in {meeting}")
+    branches = network.branched or (network.mesh.dim == 3 and network.in_series)
+    rule = f"be another one where the {meeting} are not one path from heel to toe"
+    require(not (drained and branches), "uplift", "drained", rule)
 
 
 # -- paths in the plane

@@ -72,10 +72,7 @@ HISTORY = {
         "ratio of the level to that scheduled for this t; with drive_load the factor of that load",
     ),
     "iterations": ("-", "Newton iterations of the step"),
-    "cuts": (
-        "-",
-        "how often the step was shortened: not converged, or pressure moved too far",
-    ),
+    "cuts": ("-", "how often the step was shortened: not converged, or pressure moved too far"),
     "residual": (
         "-",
         "norm of the out-of-balance forces over that of the loads at the highest water",
@@ -134,9 +131,7 @@ def row_of_joint(row: dict[str, float], joint: int) -> dict[str, float]:
 def with_all_joints(
     columns: Columns, case: Case, of_joints: Collection[str] = HISTORY_OF_JOINTS
 ) -> Columns:
-    """Columns of the first joint's table, then those of each further joint, which `of_joints`
-    names.
-    """
+    """Columns of the first joint's table, then those of each joint that `of_joints` names."""
     others = {
         column_of(name, k): (columns[name][0], f"{joint}: {columns[name][1]}")
         for k, joint in enumerate(case.joint_names)
@@ -304,9 +299,7 @@ class Results:
         )
 
     def at(self, time: float | None = None) -> Table:
-        """The rows of the joints at a requested time, the last one by default, joint by joint from
-        heel to toe.
-        """
+        """The rows of the joints at a requested time (default: the last), from heel to toe."""
         return rows_at(self.joint, time)
 
     def at_extrapolated(self, time: float | None = None) -> Table:
@@ -390,9 +383,7 @@ def joint_table(case: Case, blocks: list[Array]) -> Table:
 
 
 def history_table(case: Case, rows: Table) -> Table:
-    """The history from an engine's output at each step; adds load_factor, unless it is in it, and
-    x_resultant.
-    """
+    """The history from an engine's output at each step; adds load_factor and x_resultant."""
     scheduled = np.array([case.level_at(time) for time in rows["time"]])
     factor = np.divide(rows["level"], scheduled, out=np.ones_like(scheduled), where=scheduled > 0)
     rows = {"load_factor": factor} | rows

@@ -46,9 +46,7 @@ def picture_style() -> Iterator[None]:
 
 
 class StateStyle(NamedTuple):
-    """How a state of the joint is drawn, in black and white too: text, color, style of its line,
-    pattern of its area.
-    """
+    """Text, color, line and pattern of a state of the joint, also for black and white."""
 
     label: str
     color: str

@@ -28,9 +28,7 @@ def draw(natural: NaturalModes, about: str, path: Path) -> None:
 
 @picture_style()
 def figure(natural: NaturalModes, about: str) -> Figure:
-    """The shapes of the modes with the water on elastic rock, with the frequencies of all; about:
-    what they are of.
-    """
+    """The shapes of the modes with water on elastic rock, all frequencies; about: their case."""
     first = natural.variants[0]
     number = min(len(first.modes), MOST)
     words = textwrap.wrap(f"{natural.case.title}: {about}", 44 * number)

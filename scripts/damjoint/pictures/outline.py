@@ -202,9 +202,7 @@ def section_of(
     scale: float,
     joints: list[JointLine],
 ) -> Section | None:
-    """Cut the displaced mesh at its lowest z; None if a body has no face there, or a joint is
-    inside a body.
-    """
+    """Cut the displaced mesh at its lowest z; None: no face there, or a joint in a body."""
     if any(joint.upper == joint.lower for joint in joints):
         return None
     planes = {n: plane_body(bodies[n], u, scale) for n, u in displacement.items()}

@@ -42,9 +42,7 @@ def embedded(figure: Figure) -> list[str]:
 
 
 def bands(path: Path) -> list[str]:
-    """Encode a picture of a file as data addresses of bands below each other, cut where it is
-    white, so that a page can end between them.
-    """
+    """A picture file as data addresses of bands, cut where it is white: pages end between them."""
     picture = Image.open(path).convert("RGB")
     inked = np.asarray(picture).min(axis=(1, 2)) < WHITE
     cuts, encoded = [0], list[str]()

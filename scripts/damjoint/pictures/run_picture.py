@@ -560,9 +560,7 @@ def draw_solid(figure: AnyFigure, solution: Solution, time: float) -> None:
 
 
 def draw_view(figure: AnyFigure, solution: Solution, time: float) -> None:
-    """Draw the deformed skin of all bodies, in colors of the displacement; no view without
-    fields.
-    """
+    """Draw the deformed skin of all bodies, in colors of the displacement, if there are fields."""
     field = solution.fields.get(time)
     if field is None:
         return

@@ -50,9 +50,7 @@ def undeformed_faces(case: Case) -> Faces:
 
 
 def displaced_faces(section: Section) -> Faces:
-    """The faces of a section of the displaced mesh; the ground reaches the dam, also beside a joint
-    that has slipped.
-    """
+    """The faces of a section of the displaced mesh; the ground reaches a dam that slipped."""
     up, down = section.upstream, section.downstream
     floor, bed = np.vstack([up[-1:], section.floor]), np.vstack([section.bed, down[:1]])
     lines = {UP: up, DOWN: down, TOP: section.crest, FLOOR: floor, BED: bed}
@@ -96,9 +94,7 @@ def forces_on(case: Case, loading: Loading) -> dict[str, Array]:
 
 
 def force_label(name: str, force: Array) -> str:
-    """Name and magnitude of a line force (2,) [N/m]; of the earthquake its coefficients; empty if
-    it is zero.
-    """
+    """Name and size of a line force (2,) [N/m], of an earthquake its coefficients; empty: zero."""
     if name == QUAKE:
         return ", ".join(f"{n} = {v:.3g}" for n, v in zip(COEFFICIENTS, force, strict=True) if v)
     return f"{name} {with_unit(math.hypot(*force), FORCES, 3)}" if force.any() else ""
@@ -179,9 +175,7 @@ def pressure_label(case: Case, level: float) -> str:
 
 
 def marked(case: Case, bodies: Mapping[str, Body]) -> dict[str, Array]:
-    """Points of application (3,) [m] of the line forces, nearest to the viewer; without the mesh's
-    lines those of a section by parameters.
-    """
+    """Points (3,) [m] of the line forces, nearest to the viewer, of the mesh or the section."""
     section, depth = case.section, case["thickness"] if case["dim"] == 3 else 0.0
     names = [name for name in LINES if name != POINT]
     regions = {constants()[name.upper()][0]: name for name in names}
@@ -315,9 +309,7 @@ class Scene:
         return self.on_joint(joint, MIDDLE * joint.s.max())
 
     def crack(self, joint: JointShape) -> Array:
-        """Quadrangles (steps, n, 4, 3) of the water under pressure between the faces of an open
-        joint; points where there is none.
-        """
+        """Quadrangles (steps, n, 4, 3) of water under pressure in an open joint; points: none."""
         low, high = (self.displaced_face(joint, upper) for upper in (False, True))
         pressure = joint.along(lambda rows: rows["p"])
         wet = (joint.segment_states == BROKEN) & (pressure[:, :-1] > 0) & (pressure[:, 1:] > 0)
@@ -325,9 +317,7 @@ class Scene:
         return np.where(wet[..., None, None], faces, faces[:, :, :1])
 
     def resultant(self, joint: JointShape) -> tuple[Array, Array]:
-        """Tips (steps, 3) and forces (steps, 2) of the effective resultant on a joint; zero where
-        it has no place on it.
-        """
+        """Tips (steps, 3) and forces (steps, 2) of a joint's resultant; zero: without a place."""
         face = self.displaced_face(joint, upper=False)
         tips, forces = [], []
         for step, (line, state) in enumerate(zip(face, joint.states, strict=True)):
@@ -378,9 +368,7 @@ CELLS = 24
 
 
 def water_surface(bodies: Mapping[str, Body], level: float) -> Array:
-    """Quadrangles (n, 4, 3) of the reservoir's surface of any geometry: upstream of the dam and
-    above the ground.
-    """
+    """Quadrangles (n, 4, 3) of the reservoir's surface, upstream of the dam, above the ground."""
     ground = bodies["foundation"]
     dam = np.concatenate([b.points for n, b in bodies.items() if n.split(" ")[0] == "dam"])
     tops = []

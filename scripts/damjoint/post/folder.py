@@ -116,9 +116,7 @@ def folders_in(path: Path) -> set[str]:
 
 
 def remove_tables(folder: Path, name: str = "") -> None:
-    """Remove the tables of studies of several cases from a folder; name: only if one of the cases
-    has a folder of this name.
-    """
+    """Remove tables of studies of several cases; name: only those with a case of this folder."""
     for table in HEADS:
         listed = folders_in(folder / table)
         if name in listed if name else listed:
@@ -152,9 +150,7 @@ def read_record(file: Path) -> dict[str, Any] | None:
 
 
 def clear(folder: Path) -> None:
-    """Remove the results of an earlier run from a folder and from the folders of its further
-    scenes.
-    """
+    """Remove the results of an earlier run from a folder and those of its further scenes."""
     info = read_info(folder)
     if info is None:
         return

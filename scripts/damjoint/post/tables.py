@@ -31,9 +31,7 @@ def as_text(cell: str) -> str:
 
 
 def write_csv(target: Path | TextIO, table: Mapping[str, Column], digits: str = DIGITS) -> None:
-    """Write a table with its column names to a path or an open file; numbers in a format, texts
-    escaped by `as_text`.
-    """
+    """Write a table to a path or open file: numbers in a format, texts escaped by `as_text`."""
     if isinstance(target, Path):
         with atomic_write(target) as path, path.open("w", newline="") as file:
             write_csv(file, table, digits)

@@ -153,9 +153,7 @@ def last_time(family: str) -> float:
 
 
 def compare_steps(family: str, modeling: str, columns: Mapping[str, Array]) -> list[Comparison]:
-    """Compare the steps of a test that is not a static run, columns by name, with its published
-    numbers.
-    """
+    """Compare the steps of a test other than a static run, by columns, with published numbers."""
     return [
         Comparison(r, float(columns[r.quantity][np.abs(columns["t"] - r.t).argmin()]))
         for r in table(family)
@@ -201,9 +199,7 @@ def columns_of(comparisons: list[Comparison], digits: int = 6) -> dict[str, list
 
 
 def report(comparisons: list[Comparison], style: str = "simple") -> str:
-    """Format the comparisons as a table of all columns and a summary line; style: a format of
-    tabulate.
-    """
+    """Format the comparisons as a table of all columns and a summary; style: of tabulate."""
     from tabulate import tabulate
 
     columns = columns_of(comparisons)
@@ -221,9 +217,7 @@ BEFORE, AFTER = ("case", "uplift", "quantity"), ("source", "evaluation")
 
 
 def printed(comparisons: list[Comparison], width: int | None) -> str:
-    """Format the summary and the comparisons of a family for a terminal of this width, None: with
-    all columns.
-    """
+    """Format summary and comparisons of a family for a terminal's width, None: all columns."""
     columns = columns_of(comparisons, 6 if width is None else 5)
     columns.pop("note", None)
     units = columns.pop("unit")

@@ -227,9 +227,7 @@ class GravityMethod:
 
 
 def alternatives(shortest: GravityMethod) -> str:
-    """The shortest crack in equilibrium and, if it grows past the drains or another limit, the
-    longer ones.
-    """
+    """The shortest crack in equilibrium and, if it grows past drains or such, longer ones."""
     longer = (f"; if it grows further, {state.description}" for state in shortest.further)
     return "".join([shortest.description, *longer])
 
@@ -333,9 +331,7 @@ def shortest_crack(
 
 
 def crack_before_earthquake(case: Case, time: float, level: float, tension: bool) -> float | None:
-    """The crack length [m] without the earthquake that acts at a time; None if the water in the
-    joint does not follow from it.
-    """
+    """The crack length [m] without the present earthquake; None: the water does not follow it."""
     if not freezes_uplift(case) or not Loading.at(case, time, level, 0.0).part("quake"):
         return None
     without_quake = replace(case, values=case.values | {"k_h": 0.0, "k_v": 0.0})

@@ -26,9 +26,7 @@ LARGE_MOVE = 0.5
 
 
 def hints(results: Results) -> list[str]:
-    """Hints on a result besides its verdict: limits of the model, what to change; with several
-    joints those of a joint with its name.
-    """
+    """Hints besides the verdict: limits of the model, what to change; of several joints by name."""
     case, of_joints = results.case, list[str]()
     for k, joint_result in enumerate(results.joints):
         name = case.named((k,))
@@ -137,9 +135,7 @@ def hints_on_run(results: Results) -> list[str]:
 
 
 def tension_share(case: Case, last: dict[str, float]) -> float:
-    """Part of the overturning moment that the tension of the open points balances; nan if it is not
-    known.
-    """
+    """Part of the overturning moment that tension of open points balances; nan: not known."""
     pull = case.law.open_tension * last["crack_length"]
     if case.geometry or not pull:
         return np.nan

@@ -133,9 +133,7 @@ def loads_in_part(case: Case) -> Iterator[str]:
 
 
 def understood(case: Case) -> str:
-    """Sizes and weight of the geometry of one's own of a case, and what is under water; empty for
-    a section by parameters.
-    """
+    """Sizes and weight of a geometry of one's own, and what is under water; empty: a section."""
     if not case.geometry:
         return ""
     mesh = mesh_of(case)

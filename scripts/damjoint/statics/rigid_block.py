@@ -61,9 +61,7 @@ def force(name: str, fx: float, fy: float, point: tuple[float, float]) -> Load:
 
 
 class Segment(NamedTuple):
-    """A straight part of a face from (x0, y0) to (x1, y1), counted from the joint's toe [m]; the
-    body on its left.
-    """
+    """A straight face from (x0, y0) to (x1, y1), from the joint's toe [m]; its body on the left."""
 
     x0: float
     y0: float
@@ -115,9 +113,7 @@ class Segment(NamedTuple):
         ).times(part)
 
     def zangar_load(self, surface: float, floor: float) -> Load:
-        """The resultant of a pressure H (u + Sqrt[u]), see `zangar_column` (surface and floor:
-        heights above the toe [m]).
-        """
+        """The resultant of H (u + Sqrt[u]), see `zangar_column` (heights above the toe [m])."""
         width, rise = self.x1 - self.x0, self.y1 - self.y0
         if rise == 0:
             return Load("pressure", 0, 0, 0, 0)
@@ -250,9 +246,7 @@ def added_pressure(case: Case, body: RigidBlock, level: float) -> Load:
 def loads_on(
     case: Case, body: RigidBlock, time: float, level: float, tail: float
 ) -> tuple[Load, ...]:
-    """All loads on the body above the joint but the water in the joint; the weight first, others
-    only if they act.
-    """
+    """All loads on the body above the joint but its water: the weight, then others that act."""
     area, *center = body.area_and_centroid
     centroid = (center[0], center[1])
     weight = case["rho_dam"] * case["g"] * area

@@ -11,15 +11,7 @@ from ..input.values import has_drains, level_unknown
 from ..model.results import Results
 from ..units import FORCES, STRESSES, with_unit
 from . import gravity
-from .verdict import (
-    STIFF_JOINT,
-    Bound,
-    bound,
-    failure,
-    slipped_from,
-    stiffness_ratio,
-    verdict,
-)
+from .verdict import STIFF_JOINT, Bound, bound, failure, slipped_from, stiffness_ratio, verdict
 
 #: Why there is no equilibrium above a bound of statics, by how the dam fails there.
 REASONS = {

@@ -40,9 +40,7 @@ class Uplift:
         crack: float,
         dry_until: float = 0.0,
     ) -> None:
-        """dry_until: end of the part behind the crack [m] that an earthquake has opened, without
-        pressure.
-        """
+        """dry_until: end [m] of the part without pressure that an earthquake has opened."""
         self.length, mode, path = body.length, case["uplift"], path_of(case, tail)
         if not path:
             raise InputError(

@@ -72,9 +72,7 @@ def failure(results: Results) -> Failure:
 
 
 def failed(results: Results) -> bool:
-    """Whether the run's exit code has to be 1: stopped, or sliding on a hardening that the user has
-    not set.
-    """
+    """Whether the exit code is 1: stopped, or sliding on a hardening that the user has not set."""
     if results.stopped or not results.last:
         return True
     slipped = slipped_joints(results)
@@ -105,9 +103,7 @@ def decisive_joint(results: Results) -> int:
 
 
 def sliding_factor(results: Results, state: Mapping[str, float]) -> float:
-    """SSF of the only joint of these results in a row of its history; infinite if its law does not
-    limit shear.
-    """
+    """SSF of the only joint in a row of its history; infinite if its law does not limit shear."""
     if not results.case.law.limits_shear:
         return np.inf
     forces = state["N"], state["T"], state["bonded_length"]
@@ -115,17 +111,13 @@ def sliding_factor(results: Results, state: Mapping[str, float]) -> float:
 
 
 def failing_joints(results: Results) -> tuple[int, ...]:
-    """The numbers of the joints at which the dam fails, of a single joint that one; empty if it
-    stands, or if it is not known where it fails.
-    """
+    """The joints at which the dam fails, by number; empty if it stands or that is not known."""
     why = failure(results)
     return (0,) if why.mode and not results.case.of_joints else why.joints
 
 
 def slipped_joints(results: Results) -> tuple[int, ...]:
-    """The numbers of joints that have slipped along all of their length and alone hold what is
-    above them; empty if there are none.
-    """
+    """The joints that alone hold what is above and have slipped along all of their length."""
     slipped = [
         k for k, joint_result in enumerate(results.joints) if slipped_from(joint_result) is not None
     ]
@@ -254,9 +246,7 @@ def highest_by_statics(case: Case, last: dict[str, float]) -> tuple[float, str, 
 
 
 def has_bounds(case: Case) -> bool:
-    """Whether statics bounds the resultants on a case's only joint: they follow from the loads, and
-    from the length of the crack.
-    """
+    """Whether statics bounds the resultants on the only joint: they follow from loads and crack."""
     return not (case.geometry or case["uplift"] == "flow" or freezes_uplift(case))
 
 
@@ -342,8 +332,6 @@ def stiffness_ratio(results: Results) -> float:
 
 
 def overturning_level(case: Case) -> float:
-    """Level [m] of a uniform pressure at which the rigid dam without tension turns over about its
-    toe: the moment is linear in it.
-    """
+    """Level [m] of a uniform pressure at which the rigid dam without tension turns over."""
     at_0, at_1 = (gravity.at(case, case.times[-1], level).M for level in (0.0, 1.0))
     return at_0 / (at_0 - at_1)

@@ -39,18 +39,14 @@ ROCK = "foundation"
 
 
 def principal(stress: Array) -> Array:
-    """Principal stresses (n, 3), from the largest compression to the largest tension, of stresses
-    (n, 6): xx, yy, zz, xy, yz, xz.
-    """
+    """Principal stresses (n, 3), most compressive first, of (n, 6): xx, yy, zz, xy, yz, xz."""
     xx, yy, zz, xy, yz, xz = stress.T
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
     return np.linalg.eigvalsh(tensor)
 
 
 def corners(solution: Solution, time: float) -> list[tuple[Array, float]]:
-    """The ends (k, 3) of the joints at a time, and the distance that counts as close to them [m],
-    of each joint.
-    """
+    """The ends (k, 3) of the joints at a time, and how far is close to them [m], of each joint."""
     of_joints = []
     for joint in solution.result.joints:
         rows = joint.at(time)
@@ -71,9 +67,7 @@ def regular(points: Array, ends: list[tuple[Array, float]]) -> BoolArray:
 
 
 def stress_of(solution: Solution, time: float, rock: bool) -> tuple[Array, Array]:
-    """The middles (n, 3) and stresses (n, 6) [Pa] of the elements of the rock, or of all that
-    stands on it.
-    """
+    """Middles (n, 3) and stresses (n, 6) [Pa] of the elements of the rock, or of all on it."""
     stress = solution.fields[time].stress
     names = [name for name in stress if (name == ROCK) == rock]
     middles = [solution.bodies[name].middles() for name in names]
@@ -81,9 +75,7 @@ def stress_of(solution: Solution, time: float, rock: bool) -> tuple[Array, Array
 
 
 def extremes(solution: Solution, time: float) -> Table:
-    """Tabulate the largest principal stresses of dam and rock, with their places, apart from the
-    ends of the joints.
-    """
+    """Tabulate the largest principal stresses of dam and rock away from the joints' ends."""
     ends = corners(solution, time)
     names, rows = list[str](), list[list[float]]()
     for name, rock in (("dam", False), ("rock", True)):

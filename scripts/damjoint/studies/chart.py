@@ -147,9 +147,7 @@ def quantity(name: str) -> tuple[str, str]:
 
 
 def axis_of(name: str, values: np.ndarray) -> tuple[str, float]:
-    """The label of the axis of a varied or sampled name, and the factor from its values to the unit
-    that suits them.
-    """
+    """The label of the axis of a varied or sampled name, and the factor to the unit that suits."""
     words, size = quantity(name) if name == "level" else (name, parameters.parameter(name).unit)
     size, factor = unit([values], UNITS.get(size, ((size, 1),)))
     return f"{words} [{size}]" if size else words, factor
@@ -187,9 +185,7 @@ def drawn_of(plan: Plan) -> dict[str, tuple[str, Units]]:
 
 
 def panels_of(figure: Figure, table: Table) -> Iterator[tuple[Axes, str, tuple[str, Units]]]:
-    """Create axes for the quantities drawn, with column, label and units: DRAWN and SSF, those of
-    earthquakes, or the critical value alone.
-    """
+    """Create axes for what is drawn: DRAWN and SSF, those of earthquakes, or critical values."""
     plan, drawn = table.plan, drawn_of(table.plan)
     if plan.critical:
         words, size = quantity(plan.critical)
@@ -265,9 +261,7 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
 
 
 def note_zero(panel: Axes, number: int, rows: int, valued: bool) -> None:
-    """Say in a panel that all values of a number of the rows are zero, and the others have none;
-    valued: whether rows that fail have values, too.
-    """
+    """Say that a number of the rows have zero, the others none; valued: also rows that fail."""
     panel.set(yticks=[0] if number else [], ylim=(-1, 1))
     text = f"zero in all rows that {'have a value' if valued else 'stand'}"
     text = "zero in all rows" if number == rows else text
@@ -276,9 +270,7 @@ def note_zero(panel: Axes, number: int, rows: int, valued: bool) -> None:
 
 
 def scale_axis(axis: XAxis, values: np.ndarray) -> None:
-    """Scale the axis of varied values (n,): logarithmic over more than a decade; few of them are
-    its ticks.
-    """
+    """Scale the axis of varied values (n,): logarithmic beyond a decade; few are its ticks."""
     if values.min() > 0 and values.max() >= DECADE * values.min():
         axis.axes.set_xscale("log")
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

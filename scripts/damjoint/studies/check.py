@@ -236,9 +236,7 @@ def hand_calculation(result: Results, alone: bool = True) -> GravityMethod | Non
 
 
 def compare_methods(result: Results, statement: str, unjudged: str, alone: bool) -> SafetyCheck:
-    """Apply both methods to a joint, the only one of `result`; arguments as in `by_finite_elements`
-    and `hand_calculation`.
-    """
+    """Both methods at the only joint; see `by_finite_elements` and `hand_calculation`."""
     method = hand_calculation(result, alone)
     elements = by_finite_elements(result, statement, unjudged, alone)
     accuracy = result.info.get("error_estimate", {}).get("statement", "")

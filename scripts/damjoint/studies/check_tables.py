@@ -126,9 +126,7 @@ def labelled_notes(checks: list[SafetyCheck]) -> list[str]:
 
 
 def scene_label(checks: list[SafetyCheck], row: Row) -> str:
-    """Name of a row's case, with its uplift if the case has several scenes, and its joint if it has
-    several.
-    """
+    """Name of a row's case, with uplift and joint where the case has several."""
     same = [c.finite_elements for c in checks if c.case.name == row["case"]]
     joints = list(dict.fromkeys(result.joint for result in same))
     scenes = {result.case["uplift"] for result in same if result.joint == joints[0]}
@@ -165,9 +163,7 @@ def picture_table(check: SafetyCheck) -> list[tuple[str, ...]]:
 
 
 def joints_table(checks: list[SafetyCheck]) -> list[tuple[str, ...]]:
-    """Table of the joints of a scene: least factors of both methods, position of N by finite
-    elements and the worse verdict.
-    """
+    """Joints of a scene: least factors of both methods, finite elements' N, the worse verdict."""
     cells: list[tuple[str, ...]] = [("joint", "SSF", "OSF", "N' in", "verdict")]
     for check in checks:
         numbers = [result.numbers for result in check.results]

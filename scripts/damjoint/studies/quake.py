@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from .. import InputError, RunError
+from .. import InputError, RunError, require
 from ..arrays import Array, Table
 from ..dynamics import absorbing, checkpoint
 from ..dynamics.frames import at_nodes
@@ -60,36 +60,28 @@ def span_of(name: str, text: str) -> tuple[float, float]:
 
 def check(case: Case, span: Span = None) -> None:
     """Raise InputError if an earthquake of a case can not be computed; span: of the frames."""
-    if case["drive"] != "level":
-        raise InputError(f"drive = {case['drive']}: must be level for damjoint quake")
+    require(case["drive"] == "level", "drive", case["drive"], "be level for damjoint quake")
     for name in ("k_h", "k_v"):
-        if case[name]:
-            raise InputError(
-                f"{name} = {case[name]:g}: must be 0 for damjoint quake: the record replaces the "
-                "seismic coefficients"
-            )
+        rule = "be 0 for damjoint quake: the record replaces the seismic coefficients"
+        require(not case[name], name, case[name], rule)
     mode = case["quake_uplift"]
-    if mode == "transient" and not any(joint["uplift"] == "flow" for joint in case.joints):
-        raise InputError(
-            "quake_uplift = transient: must be crack, unchanged or zero without uplift = flow"
+    if mode == "transient":
+        has_flow = any(joint["uplift"] == "flow" for joint in case.joints)
+        rule = "be crack, unchanged or zero without uplift = flow"
+        require(has_flow, "quake_uplift", mode, rule)
+        rule = (
+            "be > 0 with quake_uplift = transient, else the pressure would leap as a point opens "
+            "(water alone: aperture / 2.2 GPa; 1e-12 m/Pa with a little air)"
         )
-    if mode == "transient" and not case["storage"]:
-        raise InputError(
-            "storage = 0: must be > 0 with quake_uplift = transient, else the pressure would leap "
-            "as a point opens (water alone: aperture / 2.2 GPa; 1e-12 m/Pa with a little air)"
-        )
-    if mode == "crack" and case.stores_water:
-        raise InputError(
-            f"quake_uplift = crack: must be transient, unchanged or zero with time_unit = "
-            f"{case['time_unit']:g} (its flow is steady)"
-        )
+        require(case["storage"], "storage", 0, rule)
+    steady = mode == "crack" and case.stores_water
+    rule = f"with time_unit = {case['time_unit']:g} (its flow is steady)"
+    require(not steady, "quake_uplift", mode, f"be transient, unchanged or zero {rule}")
     absorbing.check(case)
     duration = Record.of(case).duration
-    if span and span[0] >= duration:
-        raise InputError(
-            f"fields = {span[0]:g}:{span[1]:g}: must begin before the end of the record, "
-            f"{duration:g} s"
-        )
+    if span:
+        rule = f"begin before the end of the record, {duration:g} s"
+        require(span[0] < duration, "fields", f"{span[0]:g}:{span[1]:g}", rule)
 
 
 #: State of an earthquake that goes on.
@@ -128,9 +120,7 @@ class QuakeRun:
             yield step.dt
 
     def result(self) -> QuakeResult:
-        """The result at the end, with the static state after it as a further row of the static
-        history.
-        """
+        """The result at the end; the static state after it is the last row of the history."""
         quake, static = self.quake, self.static
         summary = self.summary()
         summary["seconds"] = {name: round(value, 3) for name, value in self.seconds.items()}
@@ -211,9 +201,7 @@ class QuakeRun:
         return recover(self.quake.bodies, scenes)[0]
 
     def static_state_after(self) -> StepResult | None:
-        """The step to the static equilibrium under the last loads, with the joints as they are;
-        None if none is found.
-        """
+        """The step to equilibrium under the last loads, with the joints as they are; None: none."""
         return static_step(self.static.model, self.quake.now.state)
 
     def stands_with_full_uplift(self) -> bool | None:

@@ -81,9 +81,7 @@ def figure(result: QuakeResult) -> Figure:
 
 
 def draw_curves(axes: np.ndarray, result: QuakeResult) -> None:
-    """Draw ground, crest along x and its acceleration, openings, slip and forces over time, into
-    axes each.
-    """
+    """Draw ground, crest along x and its acceleration, openings, slip and forces, an axes each."""
     case, rows = result.case, result.rows
     curves = [
         ("ground [m/s$^2$]", [("along x", rows["ground_ax"], DARK)]),

@@ -25,9 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class QuakeTables:
-    """The rows of an earthquake and what they amount to, by either engine, up to its end or to an
-    error.
-    """
+    """The rows of an earthquake by either engine, up to its end or an error, and what they mean."""
 
     case: Case
     rows: Columns

@@ -192,9 +192,7 @@ HEADS = (
 
 
 def records_table(results: Sequence[Ended], width: int | None = None) -> str:
-    """Table of several earthquakes: largest acceleration, residual values, verdict; width: of the
-    terminal, None: all columns.
-    """
+    """Table of earthquakes: acceleration, residuals, verdict; width: None: all columns."""
     cells = [
         [v if isinstance(v, str) else f"{v:.4g}" for v in (r.row[name] for name in SHOWN)]
         for r in results

@@ -86,9 +86,7 @@ def row_of_peak(name: str, values: Array) -> int:
 
 
 def summary(quake: Earthquake, rows: Table, halvings: int) -> dict[str, Any]:
-    """Peaks with their times, values at the end and at rest, modes, damping, notes; rows: columns
-    of quake.csv.
-    """
+    """Peaks with times, values at the end and at rest, modes, damping, notes; rows: quake.csv."""
     number = len(rows["time"])
     result: dict[str, Any] = {
         "record": str(quake.case.record),
@@ -143,9 +141,7 @@ def intensities(record: Record, period: float) -> dict[str, Any]:
 
 
 def lift_offs(quake: Earthquake, rows: Table) -> list[str]:
-    """What is parts of the joints that open throughout and land again: a line with the numbers of
-    each, if there is one.
-    """
+    """Parts of the joints that open throughout and land again, with their numbers, in a line."""
     case, parts, shortest = quake.case, list[str](), math.inf
     for number, joint_case in enumerate(case.joints):
         joint = quake.problem.model.equilibrium.interface.joints[number]
@@ -257,9 +253,7 @@ def columns(case: Case, summary: dict[str, Any]) -> dict[str, Value]:
 
 
 def largest_slip(case: Case, summary: dict[str, Any]) -> int:
-    """The number of the joint with the largest slip at the end, but for joints between bodies that
-    other joints hold.
-    """
+    """The joint with the largest slip at the end, but for those between bodies that others hold."""
     slips = [
         -1 if case.graph.is_internal(k) else abs(summary["end"][column_of("slip", k)])
         for k in range(len(case.joints))

@@ -492,9 +492,7 @@ def label(result: MethodResult, case: Case) -> str:
 
 
 def methods_table(case: Case, checks: list[SafetyCheck], judged: bool) -> Table:
-    """Tabulate both methods at the last level for each joint, what is required and, if something is
-    and is judged, the verdicts.
-    """
+    """Both methods at the last level of each joint, requirements, and verdicts that apply."""
     results = [result for check in checks for result in check.results]
     rows = [((r.joint, r.method), r.numbers, r.verdict) for r in results]
     factors = required_by_case(case)
@@ -526,9 +524,7 @@ def in_one_unit(heads: Iterable[str], values: np.ndarray, units: Units) -> Itera
 
 
 def loads_table(rigid: GravityMethod) -> Table:
-    """Tabulate the loads on the body above the joint, the uplift and their sum: forces, lever arms
-    about the toe, moments.
-    """
+    """Loads on the body above the joint, uplift, sum: forces, lever arms about the toe, moments."""
     loads = [*rigid.loads]
     if rigid.U:
         (tx, ty), away = rigid.body.along, rigid.uplift.moment / rigid.U

@@ -10,15 +10,7 @@ import numpy as np
 from .. import ROUND_OFF
 from ..arrays import Value
 from ..input.case import Case
-from ..input.parameters import (
-    INCLUDE,
-    Parameter,
-    assignments,
-    constants,
-    declared,
-    listing,
-    parse,
-)
+from ..input.parameters import INCLUDE, Parameter, assignments, constants, declared, listing, parse
 from ..input.resolve import equal_steps
 from ..input.values import flows, flows_in_time, has_drains
 from ..units import STRESSES, Units, unit
@@ -95,9 +87,7 @@ class Entry(NamedTuple):
 
 
 def by_runs(runs: Sequence[Mapping[K, V]]) -> list[tuple[K, V, str]]:
-    """Merge what runs have: key, value, numbers of the runs with this value of the key; empty if
-    all runs have it.
-    """
+    """Merge what runs have: key, value, numbers of the runs with it; empty if all have it."""
     owners: dict[K, dict[V, list[int]]] = {}
     for number, run in enumerate(runs, start=1):
         for key, value in run.items():
@@ -273,9 +263,7 @@ def uplift_in_earthquake(case: Case) -> str:
 
 
 def limits(case: Case, earthquake: bool = False) -> Iterator[str]:
-    """Yield what the model of a case includes and what it does not, a sentence each; earthquake:
-    whether a record follows the static loads.
-    """
+    """What the model of a case includes and what not, in sentences; earthquake: after statics."""
     yield "Displacements and strains are small: equilibrium is that of the undeformed geometry."
     if any("path" in joint.section for joint in case.joints):
         yield (

@@ -145,9 +145,7 @@ def result_file(
 
 
 class SavedRows(Record):
-    """A study whose rows are added to a result file, with its record beside it from the first row
-    on that it adds.
-    """
+    """A study that adds rows to a result file; its record beside it from the first row on."""
 
     def __init__(self, name: str, file: ResultFile, notes: Sequence[str]) -> None:
         super().__init__(name, beside(file.path, RECORD), notes)

@@ -184,9 +184,7 @@ def probability(failed: int, undecided: int, number: int) -> tuple[float, float,
 
 
 def sensitivity(values: Array, outcome: Array) -> float:
-    """Spearman's rank correlation of an input with an outcome; nan if either is constant or less
-    than three rows have both.
-    """
+    """Spearman's rank correlation of two columns; nan: one is constant, or less than three rows."""
     both = np.isfinite(values) & np.isfinite(outcome)
     if np.sum(both) < 3 or min(np.ptp(values[both]), np.ptp(outcome[both])) == 0:
         return np.nan

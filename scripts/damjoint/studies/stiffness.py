@@ -53,9 +53,7 @@ def meaning(case: Case) -> str:
 def repetitions(
     case: Case, result: Results, names: Sequence[str], engine: str
 ) -> Iterator[tuple[str, Results | str]]:
-    """The run and its repetitions, with what was changed; a message in place of results where the
-    values are refused or the run has none.
-    """
+    """The run and its repetitions, with what was changed; or why one has no results."""
     yield "as set", result
     for name in names:
         for label, factor in FACTORS.items():

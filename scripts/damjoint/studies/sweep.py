@@ -230,9 +230,7 @@ def search_of(case: Case, quantity: str) -> Search:
 
 
 def bundles(tasks: dict[str, Task]) -> list[list[str]]:
-    """Keys of cases that differ in levels only; at most MOST_TOGETHER, so that rows are written
-    in time.
-    """
+    """Keys of cases that differ in levels only, at most MOST_TOGETHER: rows are written in time."""
     groups: dict[str, list[str]] = {}
     for key, task in tasks.items():
         same = replace(task.case, levels=(), tail_levels=(), times=())
@@ -253,9 +251,7 @@ def spread(
 
 
 def client_of(scheduler: str | None) -> Any:
-    """A client of dask of a scheduler at an address, None without one, as a context. Raises
-    InputError.
-    """
+    """A client of dask of a scheduler at an address, None without one. Raises InputError."""
     if not scheduler:
         return contextlib.nullcontext()
     try:
@@ -437,9 +433,7 @@ RESULTS_OF_QUAKES = ("verdict", "residual_slip", "residual_tilt", "rigid_block_s
 
 
 def rows_table(plan: Plan, rows: list[Row], width: int | None = None) -> str:
-    """Format the first rows of a sweep: what is varied, verdict, main results; width: of the
-    terminal, None: all columns.
-    """
+    """The first rows of a sweep: what varies, verdict, results; width: None: all columns."""
     results = RESULTS_OF_QUAKES if plan.quake else RESULTS
     shown_always = [*map(column_of, plan.names), *plan.critical_columns[:3]]
     names = [n for n in dict.fromkeys([*shown_always, *results]) if rows and n in rows[0]]

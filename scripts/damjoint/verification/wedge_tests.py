@@ -185,9 +185,7 @@ class Specimen:
     def openings(
         self, space: elements.Space, part: elements.Space, points: elements.Points
     ) -> CsrMatrix:
-        """The opening at points of a part of the face from the unknowns: by symmetry twice the
-        displacement.
-        """
+        """The opening at points of a part of the face: by symmetry twice the displacement."""
         columns = self.number[2 * space.find(part)][points.values.indices]
         moves = columns >= 0
         shape = len(points.weights), int(self.number.max()) + 2

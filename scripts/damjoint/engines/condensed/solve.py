@@ -56,9 +56,7 @@ def threads_of(case: Case) -> int | None:
 def follow(
     case: Case, interface: Interface, on_step: Callable[[float], None]
 ) -> tuple[LoadStepper, BaseException | None]:
-    """The loading of a scene, followed to its end or to an error: also an interrupt, so that
-    converged steps are saved.
-    """
+    """The loading of a scene to its end or to an error, also an interrupt: it saves its steps."""
     stepper = LoadStepper(case, interface, on_step)
     try:
         stepper.run()

@@ -300,11 +300,7 @@ class Runner:
             case,
             mesh,
             folder,
-            {
-                "views": 0.0,
-                "fields": float(fields),
-                "node_points": float(case.stores_water),
-            },
+            {"views": 0.0, "fields": float(fields), "node_points": float(case.stores_water)},
         )
         steps, of_joints = [], []
 

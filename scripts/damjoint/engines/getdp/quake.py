@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import InputError, RunError
+from ... import RunError, require
 from ...arrays import Table, Value
 from ...dynamics.record import Record
 from ...dynamics.stepper import Damping
@@ -58,22 +58,14 @@ class GetdpQuake:
 def check(case: Case) -> None:
     """Raise InputError if GetDP can not compute the earthquake of a case."""
     check_static(case)
-    if case["quake_uplift"] == "transient":
-        raise InputError(
-            "quake_uplift = transient: must be crack, unchanged or zero with engine = getdp"
-        )
-    if case.geometry:
-        raise InputError(
-            f"geometry = {case.geometry}: must be a section by parameters for an earthquake with "
-            "engine = getdp"
-        )
+    mode, quake = case["quake_uplift"], "for an earthquake with engine = getdp"
+    rule = "be crack, unchanged or zero with engine = getdp"
+    require(mode != "transient", "quake_uplift", mode, rule)
+    by_parameters = f"be a section by parameters {quake}"
+    require(not case.geometry, "geometry", str(case.geometry), by_parameters)
     for name, needed in NEEDED.items():
-        value = case[name]
-        if value != needed:
-            shown, allowed = (v if isinstance(v, str) else f"{v:g}" for v in (value, needed))
-            raise InputError(
-                f"{name} = {shown}: must be {allowed} for an earthquake with engine = getdp"
-            )
+        allowed = needed if isinstance(needed, str) else f"{needed:g}"
+        require(case[name] == needed, name, case[name], f"be {allowed} {quake}")
 
 
 def solve(

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import ROUND_OFF, InputError, RunError, data
+from ... import ROUND_OFF, InputError, RunError, data, require
 from ...fem.memory import bulk_size, check_memory
 from ...input.case import Case
 from ...input.values import flows, flows_in_time, freezes_uplift, has_drains
@@ -30,11 +30,9 @@ SOLID = ("free", "split")
 def check(case: Case) -> None:
     """Raise InputError if there is no GetDP, or it cannot run the case."""
     process.find_getdp()
-    if case["dim"] == 3 and case["mesh_pattern"] not in SOLID:
-        raise InputError(
-            f"mesh_pattern = {case['mesh_pattern']}: must be one of {', '.join(SOLID)} "
-            "with engine = getdp in 3D"
-        )
+    if case["dim"] == 3:
+        rule = f"be one of {', '.join(SOLID)} with engine = getdp in 3D"
+        require(case["mesh_pattern"] in SOLID, "mesh_pattern", case["mesh_pattern"], rule)
     if case.geometry:
         mesh = mesh_of(case)
         case = case.with_joints([joint.of_case for joint in mesh.joints])
@@ -45,70 +43,58 @@ def check(case: Case) -> None:
 
 def check_joint(joint: Case) -> None:
     """Raise InputError if this engine cannot run a joint, from its case."""
-    if not (data("pro") / f"law_{joint['law']}.pro").is_file():
-        raise InputError(
-            f"law = {joint['law']}: must have a file pro/law_{joint['law']}.pro with engine = getdp"
-        )
+    law, uplift, engine = joint["law"], joint["uplift"], "with engine = getdp"
+    file, elastic = data("pro") / f"law_{law}.pro", joint["aperture_elastic"]
+    require(file.is_file(), "law", law, f"have a file pro/{file.name} {engine}")
     if flows_in_time(joint):
         check_flow_in_time(joint)
-    if joint["turbulent"] and joint["uplift"] == "flow":
-        raise InputError("turbulent = 1: must be 0 with engine = getdp (cubic law)")
-    if joint["aperture_elastic"] and joint["uplift"] == "flow":
-        raise InputError(
-            f"aperture_elastic = {joint['aperture_elastic']:g}: must be 0 with engine = getdp"
-        )
-    if freezes_uplift(joint):
-        raise InputError(
-            f"quake_uplift = {joint['quake_uplift']}: must be crack with engine = getdp and "
-            f"uplift = {joint['uplift']}"
-        )
-    if flows(joint) and has_drains(joint) and (joint["dim"] == 3 or joint.geometry):
-        raise InputError(
-            f"drains = 1: must be 0 with engine = getdp and uplift = {joint['uplift']} in 3D and "
-            "in a geometry of one's own"
-        )
-    if joint["uplift"] == "waterstop" and joint["dim"] == 3 and joint["order"] == 2:
-        raise InputError("order = 2: must be 1 with engine = getdp and uplift = waterstop in 3D")
+    if uplift == "flow":
+        require(not joint["turbulent"], "turbulent", 1, f"be 0 {engine} (cubic law)")
+        require(not elastic, "aperture_elastic", elastic, f"be 0 {engine}")
+    rule = f"be crack {engine} and uplift = {uplift}"
+    require(not freezes_uplift(joint), "quake_uplift", joint["quake_uplift"], rule)
+    if flows(joint) and (joint["dim"] == 3 or joint.geometry):
+        rule = f"be 0 {engine} and uplift = {uplift} in 3D and in a geometry of one's own"
+        require(not has_drains(joint), "drains", 1, rule)
+    if uplift == "waterstop" and joint["dim"] == 3:
+        require(joint["order"] != 2, "order", 2, f"be 1 {engine} and uplift = waterstop in 3D")
 
 
 def check_flow_in_time(joint: Case) -> None:
     """Raise InputError if this engine cannot run a joint that stores water, from its case."""
-    unit = f"time_unit = {joint['time_unit']:g}: must be 0 with engine = getdp"
+    other = [
+        f"and {n} = {joint[n]:g}" for n in ("joint_slope", "drains", "pressure_step") if joint[n]
+    ]
     if joint["dim"] == 3 or joint.geometry:
-        raise InputError(f"{unit} in 3D and in a geometry of one's own (steady flow)")
-    for name, plain in ("joint_slope", 0.0), ("drains", 0.0), ("pressure_step", 0.0):
-        if joint[name] != plain:
-            raise InputError(f"{unit} and {name} = {joint[name]:g} (steady flow)")
+        other.insert(0, "in 3D and in a geometry of one's own")
     if joint["drive"] != "level":
-        raise InputError(f"{unit} and drive = {joint['drive']} (steady flow)")
+        other.append(f"and drive = {joint['drive']}")
+    rule = f"be 0 with engine = getdp {''.join(other[:1])} (steady flow)"
+    require(not other, "time_unit", joint["time_unit"], rule)
 
 
 def check_user_mesh(mesh: Mesh, case: Case) -> None:
     """Raise InputError if this engine cannot run a user's own geometry."""
     shapes = {shape for solid in mesh.solids.values() for shape, _ in solid.cells}
-    if mesh.dim == 3 and shapes != {"tetra"}:
-        raise InputError(f"geometry = {case.geometry}: must have tetrahedra with engine = getdp")
+    suits = mesh.dim == 2 or shapes == {"tetra"}
+    require(suits, "geometry", str(case.geometry), "have tetrahedra with engine = getdp")
     if mesh.divided:
         mesh.face_entities()
     values_of_paths(mesh, case)
     for joint, joint_case in zip(mesh.joints, case.joints, strict=True):
         if joint.upper == joint.lower:
-            raise InputError(
-                f"geometry = {case.geometry}: joint {joint.name} must lie between two bodies with "
-                "engine = getdp"
-            )
-        if joint_case["uplift"] in ("drained", "cracked", "flow") and not has_level_ends(joint):
-            raise InputError(
-                f"uplift = {joint_case['uplift']}: must be none, imposed or waterstop with "
-                "engine = getdp where heel or toe are not level"
-            )
+            rule = f"joint {joint.name} must lie between two bodies with engine = getdp"
+            raise InputError(f"geometry = {case.geometry}: {rule}")
+        uplift = joint_case["uplift"]
+        if uplift in ("drained", "cracked", "flow"):
+            where = "with engine = getdp where heel or toe are not level"
+            rule = f"be none, imposed or waterstop {where}"
+            require(has_level_ends(joint), "uplift", uplift, rule)
         start, end = joint.heel_line
         to_line = np.linalg.norm(np.cross(joint.heel.points - start, end - start), axis=1)
-        if joint_case["uplift"] == "waterstop" and to_line.max() > ROUND_OFF * case.size**2:
-            raise InputError(
-                f"uplift = waterstop: must be another one in joint {joint.name} with engine = "
-                "getdp, as its heel is not straight"
-            )
+        straight = uplift != "waterstop" or to_line.max() <= ROUND_OFF * case.size**2
+        why = "with engine = getdp, as its heel is not straight"
+        require(straight, "uplift", uplift, f"be another one in joint {joint.name} {why}")
 
 
 #: Memory of GetDP [bytes per unknown], by dimension, and functions of order 2 per node of the mesh.
