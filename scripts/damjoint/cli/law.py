@@ -12,7 +12,7 @@ SUMMARY = "evaluate a joint law along a path of displacement jumps"
 def add(command: Parser) -> None:
     """Add the options."""
     command.add_settings()
-    command.add_argument("law", metavar="LAW", help="rupture, friction, bond or endo")
+    command.add_argument("law", metavar="LAW", help="rupture, friction, bond, endo or mixed")
     command.add_path(
         "--path",
         "FILE",

@@ -363,7 +363,8 @@ def parameter(name: str) -> Parameter:
     if name not in known:
         import difflib
 
-        near = difflib.get_close_matches(name, known, 3)
+        near = [n for n in known if n.lower() == name.lower()]
+        near = near or difflib.get_close_matches(name, known, 3)
         hint = (
             f"did you mean {' or '.join(near)}?" if near else f"allowed: {', '.join(sorted(known))}"
         )
