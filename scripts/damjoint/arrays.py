@@ -1,4 +1,4 @@
-"""Types of arrays and of the values of parameters; symmetric matrices in place."""
+"""Types of arrays and of the values of parameters; determinants; symmetric matrices in place."""
 
 from __future__ import annotations
 
@@ -38,6 +38,18 @@ def others(size: int, numbers: IntArray) -> IntArray:
     mask = np.ones(size, bool)
     mask[numbers] = False
     return np.flatnonzero(mask)
+
+
+def determinant(matrices: Array) -> Array:
+    """Determinants (...) of small matrices (..., d, d), by their first rows. A power of two as unit
+    of length changes no digit. (numpy.linalg.det takes logarithms, whose rounding depends on it.)
+    """
+    first, rest = matrices[..., :1, :], matrices[..., 1:, :]
+    if not rest.shape[-2]:
+        return np.asarray(first.prod(axis=(-2, -1)))
+    minors = [determinant(np.delete(rest, i, axis=-1)) for i in range(rest.shape[-1])]
+    signs = (-1.0) ** np.arange(len(minors))
+    return np.asarray((signs * first[..., 0, :] * np.stack(minors, axis=-1)).sum(axis=-1))
 
 
 #: Size of the blocks that are transposed.

@@ -13,7 +13,7 @@ from itertools import combinations, product
 
 import numpy as np
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, determinant
 from ..csr import CsrMatrix, stacked
 from ..mesh.body import Body
 
@@ -292,7 +292,7 @@ def geometry(points: Array, cells: IntArray, dn: Array) -> tuple[Array, Array]:
     """
     jacobian = np.einsum("md,eml->edl", dn, points[cells])
     metric = jacobian @ jacobian.transpose(0, 2, 1)
-    return np.sqrt(np.linalg.det(metric)), np.linalg.solve(metric, jacobian)
+    return np.sqrt(determinant(metric)), np.linalg.solve(metric, jacobian)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from .. import ROUND_OFF
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, determinant
 from ..csr import CsrMatrix
 from ..fem import elements
 from ..mesh.joint_mesh import Face
@@ -136,7 +136,7 @@ def points_below(shape: str, nodes: Array, height: Array) -> Iterator[tuple[Arra
             u = elements.nodal(simplex, x)[0] @ part
             n, dn = elements.nodal(shape, u)
             jacobian = dn.T @ nodes
-            area = measure(part) * weight * np.sqrt(np.linalg.det(jacobian @ jacobian.T))
+            area = measure(part) * weight * np.sqrt(determinant(jacobian @ jacobian.T))
             yield u, n @ nodes, float(area)
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from ..arrays import Setting
 from ..input.case import Case
 from ..input.geometry_file import opened
-from ..input.parameters import assignments, listing, start_gmsh
+from ..input.parameters import AUTOMATIC, assignments, declared, listing, start_gmsh
 from ..input.values import has_drains, has_point
 
 #: Parameters that the mesh always depends on.
@@ -54,6 +56,30 @@ def as_text(settings: Mapping[str, Setting]) -> str:
     return assignments(values) + "".join(listed)
 
 
+#: Height [m] from which a section is in another unit of length, millimetres: Gmsh meshes it divided
+#: by this. The last digit of a length moves nodes of a free mesh, and so all results by the error
+#: of the mesh, 1e-5 to 1e-3; the numbers of a section in metres and millimetres are then the same.
+THOUSAND = 1000.0
+#: Lists of lengths among `shares`.
+LISTS = ("downstream_face", "lift_heights", "lift_drain_x")
+#: Automatic sizes of elements, whose last digit depends on the unit.
+SIZES = ("h_dam", "h_found")
+
+
+def divided(case: Case) -> dict[str, Setting]:
+    """The parameters of `shares` with lengths divided by THOUSAND."""
+    result, source = shares(case), case.source
+    for name, value in result.items():
+        if name in LISTS and isinstance(value, tuple):
+            result[name] = tuple(float(v) / THOUSAND for v in value)
+        elif name in declared() and declared()[name].unit == "m":
+            result[name] = float(case[name]) / THOUSAND
+    if source and not source.accuracy:
+        given = source.text.defaults.keys() | source.overrides.keys()
+        result |= {name: AUTOMATIC for name in SIZES if name not in given}
+    return result
+
+
 #: Options of Gmsh by which geo/dam2d.geo chooses where element sizes come from; 1: the default.
 SIZE_OPTIONS = ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints")
 
@@ -68,10 +94,15 @@ def generate(case: Case) -> None:
     for option in SIZE_OPTIONS:  # of an earlier geometry in this process
         gmsh.option.setNumber(f"Mesh.{option}", 1)
     # a .geo file of a user may take sizes from the case
-    settings = assignments(case.values) if geometry else as_text(shares(case))
+    large = not geometry and case["dam_height"] >= THOUSAND
+    settings = (
+        assignments(case.values) if geometry else as_text((divided if large else shares)(case))
+    )
     with opened(geometry, settings):
         if not len(gmsh.model.mesh.getElements(int(case["dim"]))[0]):
             gmsh.model.mesh.generate(int(case["dim"]))
+    if large:
+        gmsh.model.mesh.affineTransform(np.pad(THOUSAND * np.eye(3), [(0, 0), (0, 1)]).ravel())
     if geometry:
         # format MSH 2.2 has an element once for each of its groups: a point that is heel and toe
         ends = [e for d in range(int(case["dim"]) - 1) for e in gmsh.model.getEntities(d)]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, determinant
 from .body import SIDES, Body
 
 #: Shape of a side by its number of corners.
@@ -153,7 +153,7 @@ def element_sizes(body: Body) -> Array:
         for corners in SIMPLICES_OF[shape]:
             points = body.points[table[:, corners]]
             edges = points[:, 1:] - points[:, :1]
-            squared = np.linalg.det(edges @ edges.transpose(0, 2, 1))
+            squared = determinant(edges @ edges.transpose(0, 2, 1))
             total += np.sqrt(np.maximum(squared, 0)) / (1, 1, 2, 6)[len(corners) - 1]
         sizes.append(total)
     return np.concatenate(sizes)

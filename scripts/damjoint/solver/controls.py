@@ -43,8 +43,10 @@ class DisplacementControl:
         return 0.0
 
     def stiffness(self, equilibrium: Equilibrium) -> float:
-        """The weight of what is missing of it in the norm of the residual, N over its unit."""
-        return equilibrium.case["K_N"] * equilibrium.bulk.width
+        """The weight of what is missing of it in the norm of the residual, N over its unit: that
+        of the closed joints.
+        """
+        return float(equilibrium.case["K_N"] * equilibrium.interface.weights.sum())
 
 
 @dataclass(frozen=True)
