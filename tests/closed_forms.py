@@ -73,9 +73,7 @@ def overturning_level(wet, arm=0.0):
 
 
 def integral(x, *factors):
-    """Integral along the joint of a product of columns, linear between the nodes (Simpson: exact to
-    degree 3).
-    """
+    """Integral along the joint of a product of columns, linear between nodes (Simpson: exact)."""
     ends = np.prod(factors, axis=0)
     middle = np.prod([(f[1:] + f[:-1]) / 2 for f in factors], axis=0)
     return np.sum(np.diff(x) * (ends[1:] + ends[:-1] + 4 * middle) / 6)

@@ -45,9 +45,7 @@ def interrupts():
 
 @pytest.fixture(scope="session")
 def solve(tmp_path_factory):
-    """solve(case, levels, tail_levels, steps, **settings): list of results, one for each uplift of
-    the case.
-    """
+    """solve(case, levels, tail_levels, steps, **settings): results, one for each uplift."""
     done = {}
 
     def once(name, levels=None, tail_levels=None, steps=None, **settings):
@@ -83,9 +81,7 @@ def texts_drawn(monkeypatch):
 
 @pytest.fixture
 def no_pictures(monkeypatch):
-    """Sweeps and checks draw no pictures, which take longer than a small scene: for tests that do
-    not look at them.
-    """
+    """Sweeps and checks draw no pictures, which take longer than a small scene."""
     monkeypatch.setattr("damjoint.studies.chart.draw", lambda *_: "no chart")
     monkeypatch.setattr("damjoint.studies.check_study.draw_check", lambda *_: None)
 

@@ -52,9 +52,7 @@ class Shuffled(InOrder):
 
 @dataclass(frozen=True)
 class OwnMesh:
-    """Points (n, 3), and regions by name: dimension, and elements as Gmsh's type and rows of
-    points.
-    """
+    """Points (n, 3); regions by name: dimension, elements as Gmsh's type and rows of points."""
 
     points: np.ndarray
     regions: dict[str, tuple[int, list[tuple[int, np.ndarray]]]]

@@ -70,9 +70,7 @@ def depth(y, level):
 
 
 def loads(case, level, tail):
-    """All loads but uplift, with staged loads applied fully, per metre: force (2,), moment about
-    the origin.
-    """
+    """All loads but uplift, each in full, per metre: force (2,), moment about the origin."""
     v = case.values
     polygon, start, direction = outline(case)
     nxt = np.roll(polygon, -1, axis=0)

@@ -687,9 +687,7 @@ def test_the_first_unstable_growth_of_a_law_without_friction_is_the_critical_lev
 
 @pytest.mark.parametrize("engine", ["condensed", pytest.param("getdp", marks=pytest.mark.heavy)])
 def test_the_crack_grows_unstably_under_a_level_above_the_critical_one(engine, tmp_path):
-    """Modeling K in both engines, level by level: no crack just below it, and two elements at once
-    just above it.
-    """
+    """Modeling K, level by level: no crack just below it, two elements at once just above it."""
     _, answer = search_result("k")
     cracks = []
     for part in (1 - 1e-3, 1 + 1e-3):

@@ -14,9 +14,7 @@ from damjoint.model.results import JOINT, Results
 
 
 def random_path(law_name: str, seed: int, case: Case) -> np.ndarray:
-    """Random walk of jumps (n, 3) that closes, opens, softens, breaks and slides in both
-    directions.
-    """
+    """Random walk of jumps (n, 3): closes, opens, softens, breaks and slides both ways."""
     rng = np.random.default_rng(seed)
     size = {
         "rupture": case["sigma_max"] / case["K_N"],

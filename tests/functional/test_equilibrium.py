@@ -59,9 +59,7 @@ def test_resultants_without_flow(solve, name, levels, tail_levels, settings):
     "name", ["e", "g", *(pytest.param(name, marks=pytest.mark.heavy) for name in "fh")]
 )
 def test_resultants_with_flow(solve, name):
-    """The uplift is the computed pressure, linear between the nodes (in 3D nearly, of the mean over
-    z).
-    """
+    """The uplift is the computed pressure, linear between the nodes (in 3D nearly)."""
     (result,) = solve(name)
     history = result.history
     accuracy = 1e-6 if result.case["dim"] == 2 else 2e-4

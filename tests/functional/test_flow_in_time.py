@@ -137,9 +137,7 @@ def test_the_steady_limit():
 
 @pytest.fixture
 def scene(request, blocks):
-    """scene(**settings): a loading up to its last level with drains, with joints that meet, or in
-    3D; all of few elements.
-    """
+    """scene(**settings): to its last level, with drains, joints that meet, or 3D; few elements."""
     drains = {"drains": 1.0, "drain_x": 4.0, "drain_effectiveness": 0.8}
     solid = {"dim": 3.0, "thickness": 3.0, "hold_z": 1.0, "mesh_pattern": "layers"}
     further = {"drains": drains, "3D": solid}.get(request.param)

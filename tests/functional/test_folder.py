@@ -308,9 +308,7 @@ def test_an_invalid_file_of_getdp_is_reported(command, tmp_path, fake_getdp, lef
 
 @pytest.fixture(scope="module")
 def first_run(tmp_path_factory):
-    """Shell script that runs GetDP; from the second time on it copies the files and the output of
-    the first one.
-    """
+    """Script that runs GetDP; from the second time on it copies files and output of the first."""
     record = tmp_path_factory.mktemp("getdp") / "record"
     run = f'{shutil.which("getdp")} "$@" > printed && cp -r . {record}'
     return f"[ -d {record} ] || {{ {run}; }}; cp -r {record}/. . && cat printed"

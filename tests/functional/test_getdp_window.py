@@ -137,9 +137,7 @@ def run_in_gmsh(project, name, settings):
 
 
 def assert_as_in_python(rows, case, folder):
-    """Compare the last rows of the joints with the default engine's, of a geometry of one's own
-    with those of the same model.
-    """
+    """Compare the joints' last rows with the default engine's, of the same model."""
     engine = "getdp" if case.geometry else "auto"
     (result, *_) = runner.run(case, folder, False, False, False, engine)
     joints = result.joints or [result]
@@ -191,9 +189,7 @@ def test_every_case_runs_in_gmsh(project, name):
 
 
 def test_every_case_has_its_files_for_gmsh():
-    """All cases but the common parts of SSNP142 and SSNP143, and what the GetDP model does not
-    have: hexahedra, flow in time.
-    """
+    """All cases but common parts and what the GetDP model lacks: hexahedra, flow in time."""
     common = {"ssnp142", "ssnp143", "d_file", "flood"}
     names = {path.stem for path in data("cases").glob("*.case")} - common
     assert names == set(WINDOWED) == {n for n in FILES["geo"] if not n.endswith(SHARED)}
@@ -207,9 +203,7 @@ SOLID = {name for name in OWN if load(name)["dim"] == 3}
     "name", [pytest.param(n, marks=pytest.mark.heavy if n in SOLID else ()) for n in OWN]
 )
 def test_files_of_a_geometry_of_its_own_are_current(name, tmp_path):
-    """They are what damjoint_tools.gmsh_files writes; of several cases what they share is in files
-    of its own.
-    """
+    """As damjoint_tools.gmsh_files writes them; what several share is in a file of its own."""
     write_gmsh_files([load(name)], tmp_path)
     for kind in ("geo", "pro"):
         stored = (data("cases") / f"{name}.{kind}").read_text()
@@ -419,9 +413,7 @@ def pixels(picture, colour):
 
 @pytest.mark.heavy
 def test_window_shows_a_complete_run(window, project):
-    """Run twice: the status is green both times, the views of the first run are removed, the water
-    of each step is drawn.
-    """
+    """Run twice: green both times, the first run's views removed, the water of each step drawn."""
     press, results = window(), project / "res/a"
     for name in ("first", "second"):
         picture = press(name)

@@ -29,9 +29,7 @@ def block():
 
 
 def test_published_openings_of_a_grouted_joint():
-    """Two mirrored blocks, fixed at their base; weight at t = 1, grouted at t = 2, compared at t =
-    3.
-    """
+    """Two mirrored blocks, fixed at their base; weight at t = 1, grouted at 2, compared at 3."""
     space, face = block()
     stiffness = elasticity(space, 2, {"dam": (3e12, 0.25)}).scipy()
     weight = -2400 * 9.81 * body_force(space, 2, 1)

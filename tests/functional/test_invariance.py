@@ -11,9 +11,7 @@ from numpy.testing import assert_allclose
 
 @pytest.mark.parametrize("name", ["a", "c"])
 def test_order_1_converges_to_order_2(solve, name):
-    """At half the element size the difference is at least halved; well inside the joint it is below
-    0.3 %.
-    """
+    """At half the element size half the difference or less; well inside the joint below 0.3 %."""
     crest = []
     for n in (25, 50):
         size = {"n_joint": n, "h_dam": 35 / n, "h_found": 70 / n, "uplift": "none"}

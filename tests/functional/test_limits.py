@@ -13,9 +13,7 @@ from numpy.testing import assert_allclose
 @pytest.mark.parametrize("hardening", [0, 1e-3])
 @pytest.mark.parametrize("uplift, levels", [("none", "7.45,7.47"), ("imposed", "6.62,6.65")])
 def test_sliding(solve, uplift, levels, hardening):
-    """Without hardening up to T = mu N + c L: 7.45784 m dry, 6.63399 m with uplift. The last state
-    is written.
-    """
+    """Up to T = mu N + c L: 7.45784 m dry, 6.63399 m with uplift. The last state is written."""
     (result,) = solve("c", levels, uplift=uplift, pena_tang=hardening)
     limit = slide_level(0.35, 1000, uplift == "imposed")
     last = result.history["level"][-1]
@@ -54,9 +52,7 @@ def test_hardening_holds_the_dam_beyond_sliding(solve):
 
 
 def test_overturning(solve):
-    """Half the weight, no tension: the resultant leaves the base at level (6 W (b -
-    xc)/WATER)^(1/3) = 9.097 m.
-    """
+    """Half the weight, no tension: N leaves the base at (6 W (b - xc)/WATER)^(1/3) = 9.097 m."""
     limit = (6 * WEIGHT / 2 * (BASE - CENTROID) / WATER) ** (1 / 3)
     (result,) = solve("i", "5,10", uplift="none", rho_dam=1200, K_N=1e13, K_T=1e13)
     assert "overturning" in statement(result)
@@ -88,9 +84,7 @@ def test_the_published_load_curve_rises_below_the_bound(solve):
 
 @pytest.mark.parametrize("drive", ["heel", "crest"])
 def test_displacement_and_level_control_give_the_same_states(solve, drive):
-    """A from 8 m on by the heel's opening or the crest's displacement; then the levels found, as
-    level control.
-    """
+    """A from 8 m on by the heel's opening or the crest's displacement; then by these levels."""
     by = {"heel": 6e-7, "crest": 1e-6}[drive]
     (driven,) = solve(
         "a", steps=5, uplift="imposed", drive=drive, drive_begin=3, drive_end=4, drive_by=by

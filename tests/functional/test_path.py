@@ -49,9 +49,7 @@ def test_monotone_filling_does_not_depend_on_the_steps(solve, law):
 @pytest.mark.heavy
 @pytest.mark.parametrize("n_joint", [60, 100])
 def test_a_dam_on_a_brittle_bond_is_followed_beyond_its_limit_point(solve, n_joint):
-    """The level falls by almost 2 m while the crack grows, and rises again; the final state is in
-    equilibrium.
-    """
+    """The level falls by almost 2 m while the crack grows, and rises again, to an equilibrium."""
     (result,) = solve("dam", "40,48,51", **BRITTLE, n_joint=n_joint)
     assert verdict(result) == "stands" and result.last["level"] == 51
     ((limit, lowest),) = result.info["limit_points"]
@@ -68,9 +66,7 @@ def test_a_dam_on_a_brittle_bond_is_followed_beyond_its_limit_point(solve, n_joi
 
 @pytest.mark.heavy
 def test_a_run_stops_at_the_critical_level(solve):
-    """Followed over a limit point, it overturns at the level that `critical` finds after unstable
-    crack growth.
-    """
+    """Over a limit point it overturns at the level of `critical` after unstable crack growth."""
     levels = "23.275,37.24,41.895,46.55"
     (result,) = solve("dam", levels, weight_first=0, **NEAR_LIMIT)
     answer = Search(load("dam", NEAR_LIMIT | {"weight_first": 0.0}, levels), "level").run()

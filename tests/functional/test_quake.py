@@ -301,9 +301,7 @@ def test_free_vibration_decays_as_rayleigh_damping_says(tmp_path, braked):
 
 
 def test_modes_are_named_by_the_mass_that_moves_along_each_axis(tmp_path):
-    """The first one of a dam sways; all modes of a block on a soft joint move its whole mass along
-    one axis each.
-    """
+    """The first mode of a dam sways; all of a block on a soft joint move it along an axis each."""
     record = smooth_record(tmp_path / "r.csv", 1.0)
     first = earthquake(record, ELASTIC, "40").modes[0]
     assert first.along_x > 0.5 > 5 * first.along_y

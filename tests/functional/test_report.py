@@ -83,9 +83,7 @@ def test_plot_of_a_run_with_displacement_control(command, texts_drawn):
 
 @pytest.mark.heavy
 def test_plot_and_report_of_a_user_geometry(command, tmp_path):
-    """A stepped base, with the ends of the joint read from the mesh; no gravity method, which needs
-    a section by parameters.
-    """
+    """A stepped base, the joint's ends read from the mesh; no gravity method without a section."""
     few = "--set", "n_joint=20", "--set", "order=1", "--levels", "40", "--tail-levels", "4"
     assert command("run", "stepped", *few)[0] == 0
     path = tmp_path / "out/stepped/stepped.png"

@@ -112,9 +112,7 @@ def test_the_reactions_of_the_static_state_remain(tmp_path):
 
 @pytest.mark.heavy
 def test_what_the_dam_radiates_does_not_come_back(tmp_path):
-    """After the record an elastic dam comes to rest, with no damping but that of the boundary; on
-    massless rock it goes on.
-    """
+    """An elastic dam comes to rest by the damping of the boundary; on massless rock it goes on."""
     record = smooth_record(tmp_path / "r.csv", 1.0, duration=0.4, frequency=6.0)
     elastic = HEAVY | {"adhesion": 1e12, "damping": 0.0, "hht_alpha": 0.0, "record_rest": 2.0}
 

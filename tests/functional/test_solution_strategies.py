@@ -25,9 +25,7 @@ def test_a_joint_without_tensile_strength_opens_in_one_step(solve, uplift, n_joi
 
 
 def test_short_shear_release_on_a_soft_dam(solve):
-    """SSNP142's brittle joint (L_CT = 1e-10 m) under openings of 4e-4 m. An independent solver
-    finds 4.142e-4 m.
-    """
+    """SSNP142's brittle joint (L_CT = 1e-10 m) opened by 4e-4 m; by another solver 4.142e-4 m."""
     (result,) = solve("ssnp142", "40", dam_height=40, dam_base=30, E=1e10, h_found=7)
     assert verdict(result) == "stands"
     assert result.history["max_opening"][-1] == pytest.approx(4.142e-4, rel=2e-3)
@@ -167,9 +165,7 @@ def test_unstable_crack_growth_ends_in_equilibrium(solve):
     [(0.0, 1.0, "tolerance"), (1e-6, 1.0, "round-off"), (1e-6, 1e-7, ""), (1e-3, 1.0, "")],
 )
 def test_the_criterion_by_which_a_solution_ends(rest, ceiling, criterion):
-    """A spring of 1e12 N/m to 0.1 m whose residual keeps a rest [N]: the last bit of the jump is
-    1e-5 N.
-    """
+    """A spring of 1e12 N/m to 0.1 m with a residual [N] below the last bit of the jump, 1e-5 N."""
 
     def evaluate(jump, level, last):
         residual = 1e12 * (jump - 0.1)
@@ -197,9 +193,7 @@ def test_the_criterion_by_which_a_solution_ends(rest, ceiling, criterion):
     ],
 )
 def test_how_a_solution_ends_that_does_not_converge(factor, message):
-    """A spring whose corrections are a part of what is missing, too small, or in the wrong
-    direction.
-    """
+    """A spring whose corrections are a part of what is missing, or in the wrong direction."""
 
     def evaluate(jump, level, last):
         residual = 1e12 * (jump - 0.1)

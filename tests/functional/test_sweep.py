@@ -148,9 +148,7 @@ def test_all_rows_of_close_levels_converge_and_their_openings_increase(command, 
 
 @pytest.mark.heavy
 def test_a_scheduler_with_two_workers(tmp_path, monkeypatch):
-    """The same rows as in this process, from a dask cluster of two processes; two bundles of two
-    rows in a task.
-    """
+    """The rows of this process, from a dask cluster of two processes; two bundles in a task."""
     from distributed import LocalCluster  # slow to import, and each process reads all tests
 
     monkeypatch.setattr(sweep, "TASKS_PER_THREAD", 1)

@@ -60,9 +60,7 @@ def test_a_free_wall_expands_and_bends_without_stress(engine, solid):
 
 @pytest.mark.parametrize("engine", ["condensed", "getdp"])
 def test_warm_rock_without_lateral_contraction_is_pressed_by_its_fixed_ends(engine):
-    """nu = 0, far from the ends: its surface rises by alpha T times its depth, and sigma_xx =
-    sigma_zz = -E alpha T.
-    """
+    """nu = 0, inside: the surface rises by alpha T depth, and sigma_xx = sigma_zz = -E alpha T."""
     rock = {"found_depth": 5, "found_side": 50, "nu": 0, "temperature_found": 10, "h_found": 2}
     run = dj.run(dj.case("dam", levels=[0], **WALL | rock), engine=engine)
     (field,), body = run.solution.fields.values(), run.solution.bodies["foundation"]

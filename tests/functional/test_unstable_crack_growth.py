@@ -22,9 +22,7 @@ SLENDER = {"dam_height": 40, "dam_base": 28.8, "E": 1e10, "h_found": 7, "sigma_m
 )
 @pytest.mark.parametrize("n_joint", [50, pytest.param(100, marks=pytest.mark.heavy)])
 def test_a_slender_dam_fills_to_its_crest(command, uplift, n_joint):
-    """The result files satisfy equilibrium and law, also in the rounds with frozen damage that
-    the flow needs.
-    """
+    """The files satisfy equilibrium and law, also in rounds with frozen damage, for flow."""
     overrides = SLENDER | {"uplift": uplift, "n_joint": n_joint}
     words = [w for name, value in overrides.items() for w in ("--set", f"{name}={value}")]
     words = ["run", "ssnp142", *words, "--levels", "40"]

@@ -94,9 +94,7 @@ class User:
 
 
 class SharedEngine(EngineProcess):
-    """The engine's process; that of a window that is closed serves the next one, as a start takes
-    longer than most tests.
-    """
+    """The engine's process; a closed window's serves the next, as a start takes long."""
 
     ready, used = None, False
 
@@ -515,9 +513,7 @@ def test_the_corners_of_the_downstream_face_can_be_changed(open_window, tmp_path
 
 @pytest.mark.heavy
 def test_each_joint_of_a_case_with_several_is_shown_and_saved(open_window, command, tmp_path):
-    """A changed value is that of all joints, and the heights can be changed; the saved case gives
-    the same bytes.
-    """
+    """A changed value is that of all joints, heights can change; the saved case: the same bytes."""
     mine = tmp_path / "mine.case"
     mine.write_text(
         'lift_heights() = {15, 25}; default_law = "friction"; default_mu = 1; levels() = {30};'
@@ -841,9 +837,7 @@ LOADS = {"silt_height": 2.0, "ice_force": 1e3, "ice_level": 7.0, "anchor_force":
 
 @pytest.mark.parametrize("joint", [{"joint_slope": 5.0}, {"joint_height": 4.0}])
 def test_water_and_loads_are_drawn_for_any_section(open_window, joint):
-    """Before the run the water's area is that of the outline; after it slightly more or less, as
-    the displaced faces are drawn.
-    """
+    """Before the run the water's area is that of the outline; after it nearly, as faces move."""
     user = open_window("e", **SMALL, **SECTION, **joint, **LOADS, uplift="imposed")
     user.type(tree.LEVELS, "6, 10.5")
     user.type(tree.TAIL_LEVELS, "0, 3")
@@ -1027,4 +1021,4 @@ def test_a_flood_shows_its_time_and_the_pressure_of_each_step(open_window):
     assert "16 of 16 h" in views.caption(scene, last)[0]
     assert "8 of 16 h" in views.caption(scene, last // 2)[0]
     assert len({tuple(scene.result.at(t)["p"]) for t in scene.times}) == len(scene.times) > 8
-    assert [n for n in user.views if "water pressure" in n or n.startswith("pressure")]
+    assert any("pressure" in name for name in user.views)

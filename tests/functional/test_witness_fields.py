@@ -188,9 +188,7 @@ def test_other_values_of_the_water_are_noticed(written, change):
     ],
 )
 def test_water_where_joints_meet_in_3d(tmp_path, uplift, level, tail):
-    """Two or three joints at a line, each with its own aperture, also with a dry end; water of
-    another aperture is noticed.
-    """
+    """Two or three joints at a line, each with its aperture, also a dry end; another is noticed."""
     words = f"run ssnp143 --set dim=3 --set uplift={uplift} --set aperture_min=1e-4,2e-4,3e-4 "
     words += f"--levels {level} --tail-levels {tail}"
     cli.main([*words.split(), "--no-picture", "--all-steps", "--out", str(tmp_path)])

@@ -46,9 +46,7 @@ def test_all_of_an_entry_is_read_again(entry):
 
 
 def test_bodies_in_the_cache_have_all_faces_under_water(tmp_path, monkeypatch):
-    """A face above the tailwater of the case that was condensed first: the neck, in a case whose
-    tailwater reaches it.
-    """
+    """A face above the tailwater of the case condensed first, which another's reaches: the neck."""
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path))
     below, lower, above = (
         load("dam", SMALL | {"neck_height": 10}, (44.0,), (tail,)) for tail in (3.0, 4.0, 42.0)

@@ -86,9 +86,7 @@ def test_a_block_sets_the_values_of_one_joint(tmp_path):
 
 
 def test_a_case_adds_to_the_blocks_of_an_included_one(tmp_path):
-    """By the value; a default for all joints replaces those of an included file; no lifts, no
-    blocks of lifts.
-    """
+    """By the value; a default for all joints replaces included ones; no lifts, no blocks."""
     write(tmp_path, LIFTS + "Struct Joint::base [ mu 0.9 ];", "common.case")
 
     def values(text, name):

@@ -185,9 +185,7 @@ def test_resultants_of_ssnp142():
 
 
 def side_of(case, side):
-    """Straight parts of the faces of the upper body, as pairs of points in the order of
-    pro/section.pro.
-    """
+    """Straight parts of the upper body's faces, as pairs of points in pro/section.pro's order."""
     found = case.section
     code = {"UP": 0, "DOWN": 1, "TOP": 2}[side]
     columns = zip(
@@ -516,9 +514,7 @@ def test_uplift_between_dry_ends(mode, slope, level, tail):
 
 
 def test_drains_have_no_effect_if_the_crack_passes_them():
-    """Drains that stop the crack leave it shorter; weak ones near the heel are passed and have no
-    effect.
-    """
+    """Drains that stop the crack leave it shorter; weak ones near the heel are passed."""
     settings = DRAINS | {"uplift": "cracked", "sigma_max": 0.0, "rho_dam": 2150.0}
     without = gravity.at(large(settings), 1)
     stopped = gravity.at(large(settings | {"drains": 1.0, "drain_x": 10.0}), 1)

@@ -14,9 +14,7 @@ def columns(text):
 
 
 def test_path_file_to_standard_output_and_to_a_file(command, tmp_path):
-    """Rupture by hand: peak at 1e-10 m, half of it at 1.1e-10 m, contact at -1e-9 m; p is
-    subtracted from sigma_n.
-    """
+    """By hand: peak at 1e-10 m, half of it at 1.1e-10 m, contact at -1e-9 m; p is subtracted."""
     (tmp_path / "path.csv").write_text(
         "delta_n,delta_t1,delta_t2,p\n1e-10,0,0,0\n1.1e-10,0,0,1000\n-1e-9,2e-9,-1e-9,0\n"
     )

@@ -52,9 +52,7 @@ def test_stress_of_a_monotone_opening():
 
 
 def test_unloading_to_the_origin_and_reloading():
-    """From 50 Pa at 1.1e-10 m along the secant, back to the same point, then along the softening
-    line.
-    """
+    """From 50 Pa at 1.1e-10 m along the secant, back to the point, then along the softening."""
     openings = np.array([1.1, 0.55, 0.11, 0.55, 1.1, 1.15]) * 1e-10
     assert_allclose(normal(openings), [50, 25, 5, 25, 50, 25], rtol=1e-9)
 
@@ -104,9 +102,7 @@ def test_tangential_stiffness_half_way_to_rupture(alpha, left):
 
 
 def test_slip_of_the_open_joint_is_kept_on_closing():
-    """Sheared elastically, opened (free slip to 7e-9 m), closed there: shear starts again from 7e-9
-    m.
-    """
+    """Sheared elastically, opened (free slip to 7e-9 m), closed: shear starts again from 7e-9 m."""
     jumps = [
         (-D_E, 1e-9, 0),
         (2 * L_C, 4e-9, 1e-9),
@@ -189,9 +185,7 @@ def test_shear_of_a_grouted_joint_counts_from_its_slip_at_grouting():
 
 
 def test_a_sawn_joint_has_no_bond_and_closes_later():
-    """2e-10 m sawn at t = 2, half of it at 1.5: contact from there on, no tension. What was open
-    before comes off.
-    """
+    """2e-10 m sawn at t = 2, half at 1.5: contact from there, no tension, less what was open."""
     saw = 2e-10
     openings = np.array([0.5 * D_E, 0.5 * D_E, -0.5 * saw, -1.5 * saw])
     answer = along([(d, 0, 0) for d in openings], saw_thickness=saw, saw_t=2)

@@ -9,22 +9,22 @@ import pytest
 from damjoint_tools import pages
 
 PACKAGE = Path(damjoint.__file__).parent
-WITNESS = PACKAGE.with_name("damjoint_witness")
+WITNESS, ROOT = PACKAGE.with_name("damjoint_witness"), Path(__file__).parents[2]
 #: Each part uses only those before it.
-PARTS = [
-    "",
-    "arrays",
-    "units",
-    "csr",
-    "threads",
-    "storage",
-    "progress",
-    "processes",
-    "versions",
+PARTS = ["", "arrays", "units", "csr", "threads", "storage", "progress", "processes", "versions"]
+PARTS += [
     "laws",
     "input",
+    "mesh",
+    "model",
+    "fem",
+    "joint",
+    "solver",
+    "dynamics",
+    "engines",
+    "statics",
+    "post",
 ]
-PARTS += ["mesh", "model", "fem", "joint", "solver", "dynamics", "engines", "statics", "post"]
 PARTS += ["pictures", "accuracy", "session", "runner", "studies", "verification"]
 PARTS += ["python_words", "library", "gui", "cli", "__main__"]
 
@@ -46,6 +46,25 @@ def imported(path):
             base = here[: len(here) - node.level]
             names = (node.module or "").split(".") if node.module else []
             yield from ((*base, *names, alias.name) for alias in node.names)
+
+
+def test_sections_that_the_code_names_exist():
+    folders, number = (PACKAGE, WITNESS, ROOT / "pro"), r"sections? (\d[\d.]*)\b"
+    texts = [p.read_text() for f in folders for p in f.rglob("*") if p.suffix in (".py", ".pro")]
+    headings = (ROOT / "reference" / "theory.md").read_text()
+    named = {n.rstrip(".") for t in texts if "theory" in t for n in re.findall(number, t)}
+    assert {"4", "4.3", "8"} <= named
+    assert not [n for n in named if not re.search(rf"(?m)^##+ {re.escape(n)}\b", headings)]
+    pages = {page for text in texts for page in re.findall(r'reference/(\w+\.md), "([^"]+)"', text)}
+    assert pages
+    for page, heading in pages:
+        assert f"\n## {heading}\n" in (ROOT / "reference" / page).read_text()
+
+
+def test_no_assertion_has_alternatives():
+    for path in (ROOT / "tests").rglob("*.py"):
+        asserted = [n for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Assert)]
+        assert not [m.lineno for n in asserted for m in ast.walk(n) if isinstance(m, ast.Or)], path
 
 
 @pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda p: str(p.name))

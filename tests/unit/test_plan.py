@@ -123,9 +123,7 @@ def test_contradictory_correlations_are_refused():
 
 
 def test_confidence_interval_of_a_probability():
-    """Clopper and Pearson's closed form without failures; undecided rows count as failures, but not
-    for the lower limit.
-    """
+    """Clopper and Pearson's closed form; undecided rows count but for the lower limit."""
     share, low, high = sampling.probability(0, 0, 50)
     assert (share, low) == (0, 0) and high == pytest.approx(1 - 0.025 ** (1 / 50))
     share, low, high = sampling.probability(0, 50, 50)

@@ -69,9 +69,7 @@ def test_opening_has_the_strength_the_curve_and_the_energy(law_name, curve):
 @pytest.mark.parametrize("curve", CURVES)
 @pytest.mark.parametrize("pressure", [0.0, 5e5])
 def test_sliding_has_the_strength_the_curve_and_the_energy(curve, pressure):
-    """The area above the residual friction over the slip is G_t, with the elastic part of the jump
-    recovered.
-    """
+    """The area above the residual friction over the slip is G_t, elastic part included."""
     xi = np.r_[np.linspace(0, 1, 2001), np.linspace(1, FAR, 4001)[1:]]
     stress = C * CURVES[curve](xi) + MU * pressure
     jumps = np.column_stack([0 * xi - pressure / K_N, xi * LAMBDA_C + stress / K_T, 0 * xi])
