@@ -416,10 +416,17 @@ def test_a_sealed_joint_must_store_water(blocks, tmp_path, capsys):
     with pytest.raises(InputError, match="storage = 0: must be > 0"):
         blocks(uplift, (5.0,), three, joints)
     values = "uplift=none", "middle base.uplift=flow", "time_unit=60", "order=1"
-    words = ["modes", str(tmp_path / "own.case"), "--levels", "5", "--out", str(tmp_path / "modes")]
-    assert cli.main([*words, *(word for value in values for word in ("--set", value))]) == 2
-    assert "storage = 0: must be > 0 in joints" in capsys.readouterr().err
-    assert not (tmp_path / "modes").exists()
+    given = [str(tmp_path / "own.case"), *(w for value in values for w in ("--set", value))]
+    studies = (
+        ["modes"],
+        ["sweep", "--vary", "mu=0.8,1"],
+        ["reliability", "--vary", "mu=normal(1,0.1)"],
+    )
+    for study in studies:
+        out = tmp_path / "out"
+        assert cli.main([*study, *given, "--levels", "5", "--out", str(out)]) == 2
+        assert "storage = 0: must be > 0 in joints" in capsys.readouterr().err
+        assert not out.exists()
     model = blocks(uplift, (5.0,), three, joints, storage=1e-9)
     slot = Slot(model, opened(model, [0.0] * 5))
     pressure = slot.step(opened(model, [0, 1e-4, 0, 0, 0]), 1.0)

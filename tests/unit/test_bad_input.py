@@ -144,8 +144,15 @@ def test_a_parameter_out_of_range_is_refused(command, tmp_path, setting, allowed
         ),
         (
             (
+                *("reliability", "dam", "--set", "time_unit=60", "--set", "uplift=flow"),
+                *("--vary", "mu=normal(1,0.1)"),
+            ),
+            ("time_unit = 60", "must be 0", "critical value"),
+        ),
+        (
+            (
                 *("run", "e", "--set", "time_unit=60", "--set", "drains=1"),
-                *("--set", "drain_effectiveness=1", "--engine", "getdp"),
+                *("--engine", "getdp"),
             ),
             ("time_unit = 60", "must be 0", "engine = getdp", "drains = 1"),
         ),

@@ -30,7 +30,7 @@ from .reliability import (
     openturns,
 )
 from .result_file import result_file
-from .sweep import client_of
+from .sweep import client_of, search_of
 
 #: Files of the study: the critical levels, and the case of the design point.
 ROWS, DESIGN = "reliability.csv", "design_point.case"
@@ -55,6 +55,7 @@ def reliability(
     """
     openturns()
     check_jobs(jobs)
+    search_of(case, "level")  # checks the case
     variables.normal()
     rows, columns = out / ROWS, columns_of(variables)
     keep = of_same_columns(rows, columns)

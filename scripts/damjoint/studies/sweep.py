@@ -14,6 +14,7 @@ from typing import Any, TypeAlias
 from .. import InputError, RunError, accuracy, runner
 from ..arrays import Value, Values
 from ..dynamics import record_files
+from ..engines import engine_of
 from ..input import parameters
 from ..input.case import Case
 from ..input.refinement import first_mesh
@@ -211,6 +212,8 @@ def planned(case: Case, plan: Plan) -> Iterator[tuple[str, Values, Task]]:
         search = partial(search_of, varied, plan.critical) if plan.critical else None
         if plan.quake:
             quake.check(varied)
+        if varied.geometry and varied.stores_water:
+            engine_of(varied, "auto")  # checks the paths of the water
         task = Task(varied, bool(plan.sampled), search, plan.critical_columns, plan.quake)
         yield key_of(varied, plan), row, task
 
