@@ -104,3 +104,17 @@ def command(capfd, tmp_path, monkeypatch):
         return code, *capfd.readouterr()
 
     return call
+
+
+@pytest.fixture
+def refused(command, tmp_path):
+    """refused(*words): the message on bad input, a line; nothing is printed or written."""
+
+    def call(*words):
+        before = sorted(tmp_path.rglob("*"))
+        code, out, err = command(*words)
+        assert (code, out, err.count("\n")) == (2, "", 1), err
+        assert sorted(tmp_path.rglob("*")) == before
+        return err
+
+    return call

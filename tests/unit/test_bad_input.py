@@ -10,14 +10,8 @@ RUN = "run", "a"
 TO_TWICE = "between 0 and 20 m, twice the dam's height"
 
 
-def refuse(command, tmp_path, words, parts):
-    before = sorted(tmp_path.rglob("*"))
-    code, out, err = command(*words)
-    assert (code, out) == (2, ""), err
-    lines = err.splitlines()
-    assert len(lines) == 1, err
-    assert [part for part in parts if part not in lines[0]] == [], lines[0]
-    assert sorted(tmp_path.rglob("*")) == before
+def missing(parts, message):
+    return [part for part in parts if part not in message]
 
 
 #: A base and two lift joints with drains.
@@ -67,9 +61,9 @@ LIFTS = "--set", "lift_heights=15,30", "--set", "uplift=drained"
         ("thickness=-1", "> 0"),
     ],
 )
-def test_a_parameter_out_of_range_is_refused(command, tmp_path, setting, allowed):
+def test_a_parameter_out_of_range_is_refused(refused, setting, allowed):
     name, value = setting.split("=")
-    refuse(command, tmp_path, (*RUN, "--set", setting), (f"{name} = {value}", allowed))
+    assert not missing((f"{name} = {value}", allowed), refused(*RUN, "--set", setting))
 
 
 @pytest.mark.parametrize(
@@ -163,18 +157,14 @@ def test_a_parameter_out_of_range_is_refused(command, tmp_path, setting, allowed
         pytest.param((*RUN, "--levels", "-1,3"), ("levels = -1", TO_TWICE)),
     ],
 )
-def test_bad_arguments_are_refused(command, tmp_path, words, parts):
-    refuse(command, tmp_path, words, parts)
+def test_bad_arguments_are_refused(refused, words, parts):
+    assert not missing(parts, refused(*words))
 
 
-def test_an_output_folder_that_can_not_be_written_is_refused(command, tmp_path):
+def test_an_output_folder_that_can_not_be_written_is_refused(refused, tmp_path):
     (tmp_path / "file").write_text("in the way")
-    refuse(
-        command,
-        tmp_path,
-        (*RUN, "--out", tmp_path / "file" / "below"),
-        ("out = ", "file/below", "folder that can be written"),
-    )
+    message = refused(*RUN, "--out", tmp_path / "file" / "below")
+    assert not missing(("out = ", "file/below", "folder that can be written"), message)
 
 
 @pytest.mark.parametrize(
@@ -185,10 +175,10 @@ def test_an_output_folder_that_can_not_be_written_is_refused(command, tmp_path):
         ("law", "rupture", "--path", "path.csv"),
     ],
 )
-def test_a_missing_getdp_is_reported(command, tmp_path, monkeypatch, words):
+def test_a_missing_getdp_is_reported(refused, tmp_path, monkeypatch, words):
     monkeypatch.setenv("GETDP", "/no/such/getdp")
     (tmp_path / "path.csv").write_text("delta_n,delta_t1,delta_t2\n0,0,0\n")
-    refuse(command, tmp_path, words, ("GETDP = /no/such/getdp", "GetDP >= 3.2"))
+    assert not missing(("GETDP = /no/such/getdp", "GetDP >= 3.2"), refused(*words))
 
 
 GOOD = "delta_n,delta_t1,delta_t2\n0,0,0\n"
@@ -224,30 +214,22 @@ GOOD = "delta_n,delta_t1,delta_t2\n0,0,0\n"
         ),
     ],
 )
-def test_a_bad_path_file_is_refused(command, tmp_path, law, text, parts):
+def test_a_bad_path_file_is_refused(refused, tmp_path, law, text, parts):
     if text is not None:
         (tmp_path / "path.csv").write_text(text)
-    refuse(command, tmp_path, ("law", law, "--path", "path.csv"), parts)
+    assert not missing(parts, refused("law", law, "--path", "path.csv"))
 
 
-def test_a_missing_folder_for_the_results_of_a_law_is_refused(command, tmp_path):
+@pytest.mark.parametrize(
+    "option, parts",
+    [
+        ("--out=no/answer.csv", ("out = ", "existing folder")),
+        ("--set=alpha=3", ("alpha = 3", "<= 2")),
+    ],
+)
+def test_a_bad_option_of_a_law_is_refused(refused, tmp_path, option, parts):
     (tmp_path / "path.csv").write_text(GOOD)
-    refuse(
-        command,
-        tmp_path,
-        ("law", "rupture", "--path", "path.csv", "--out", "no/answer.csv"),
-        ("out = no/answer.csv", "existing folder"),
-    )
-
-
-def test_a_bad_setting_of_a_law_is_refused(command, tmp_path):
-    (tmp_path / "path.csv").write_text(GOOD)
-    refuse(
-        command,
-        tmp_path,
-        ("law", "rupture", "--path", "path.csv", "--set", "alpha=3"),
-        ("alpha = 3", "<= 2"),
-    )
+    assert not missing(parts, refused("law", "rupture", "--path", "path.csv", option))
 
 
 def test_a_level_that_is_not_a_number_is_refused(tmp_path):
@@ -272,17 +254,14 @@ def test_a_level_that_is_not_a_number_is_refused(tmp_path):
         (("--vary", "mu=0.5", "--tie", "adhesion=1+\n2"), (r"--tie adhesion=1+\n2",)),
     ],
 )
-def test_a_bad_sweep_is_refused_in_one_line(command, tmp_path, recwarn, words, parts):
+def test_a_bad_sweep_is_refused_in_one_line(refused, recwarn, words, parts):
     """And without a warning."""
-    code, _, error = command("sweep", "c", *words)
-    assert code == 2 and len(error.splitlines()) == 1 and not recwarn.list, error
-    assert all(part in error for part in parts) and not any(tmp_path.iterdir())
+    assert not missing(parts, refused("sweep", "c", *words)) and not recwarn.list
 
 
 @pytest.mark.parametrize("law, name", [("rupture", "sigma_max"), ("bond", "adhesion")])
-def test_a_strength_whose_square_overflows_is_refused(command, law, name):
-    code, _, err = command(*RUN, "--set", f"{name}=1e308", "--set", f"law={law}")
-    assert code == 2 and len(err.splitlines()) == 1
+def test_a_strength_whose_square_overflows_is_refused(refused, law, name):
+    refused(*RUN, "--set", f"{name}=1e308", "--set", f"law={law}")
 
 
 def test_escape_sequences_do_not_reach_the_terminal(command, tmp_path):
@@ -343,10 +322,9 @@ def test_values_whose_system_is_singular_are_reported(command):
         ("ice_force=1e30", "1e+10"),
     ],
 )
-def test_a_value_beyond_any_material_or_load_is_refused(command, setting, limit):
+def test_a_value_beyond_any_material_or_load_is_refused(refused, setting, limit):
     """With it rounding would decide whether there is an equilibrium."""
-    code, out, err = command("run", "dam", "--set", setting)
-    assert (code, out) == (2, "") and len(err.splitlines()) == 1
+    err = refused("run", "dam", "--set", setting)
     name = setting.partition("=")[0].replace("E", "E_dam").replace("E_dam_", "E_")
     assert f"{name} = " in err and f"between -{limit} and {limit} " in err
 
@@ -372,11 +350,10 @@ def test_a_value_beyond_any_material_or_load_is_refused(command, setting, limit)
         ),
     ],
 )
-def test_a_stiffness_that_makes_the_system_rounding_is_refused(command, words, message):
+def test_a_stiffness_that_makes_the_system_rounding_is_refused(refused, words, message):
     """Before, no equilibrium was found, as if the dam failed."""
     settings = [word for setting in words.split() for word in ("--set", setting)]
-    code, out, err = command("run", "dam", *settings)
-    assert (code, out) == (2, "") and len(err.splitlines()) == 1 and message in err
+    assert message in refused("run", "dam", *settings)
 
 
 @pytest.mark.parametrize(
@@ -428,10 +405,9 @@ def test_within_the_range_of_moduli_a_dam_stands(modulus):
         ("dam_base=1e-9", "dam_base = 1e-09: must be >= 4.5e-05 m"),
     ],
 )
-def test_lengths_that_no_mesh_can_have_are_refused_before_meshing(command, words, message):
+def test_lengths_that_no_mesh_can_have_are_refused_before_meshing(refused, words, message):
     """Not in the mesh generator's words."""
-    code, out, err = command("run", "dam", "--set", words)
-    assert (code, out) == (2, "") and len(err.splitlines()) == 1 and message in err
+    assert message in refused("run", "dam", "--set", words)
 
 
 @pytest.mark.parametrize(
@@ -457,10 +433,9 @@ def test_lengths_that_no_mesh_can_have_are_refused_before_meshing(command, words
         ),
     ],
 )
-def test_a_downstream_face_that_no_section_can_have(command, case, words, message):
+def test_a_downstream_face_that_no_section_can_have(refused, case, words, message):
     settings = (word for setting in words.split() for word in ("--set", setting))
-    code, out, err = command("run", case, *settings)
-    assert (code, out) == (2, "") and len(err.splitlines()) == 1 and message in err
+    assert message in refused("run", case, *settings)
 
 
 @pytest.mark.parametrize("setting", ["lift_heights=1e-4", "joint_height=1e-4", "dam_crest=1e-4"])
