@@ -395,8 +395,8 @@ def test_a_step_of_a_film_may_have_two_equilibria():
 @pytest.mark.heavy
 def test_a_film_without_compressibility_in_steps_of_milliseconds():
     """A point that has just opened by 3 nm between closed ones changes the pressure by 1e18 Pa/m:
-    the iterates repeat, near the solution with a residual of its rounding, 1e-9 of the loads. The
-    compressibility of the water itself is enough, and the hint on the stopped run has it.
+    the iterates go to and fro between full film and void, 1e-13 m apart. The compressibility of
+    the water itself is enough, and the hint on the stopped run has it.
     """
     settings = {"time_unit": 0.01, "joint_slope": 3.0}
     stopped = dam((30.0, 44.0, 20.0), **settings).run()
