@@ -51,8 +51,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.2.0"
 
-#: Environment variable; 1: Gmsh may run a user's .geo file, a program that can do anything the user
-#: can.
+#: Environment variable; 1: Gmsh may run a user's .geo file, a program with all the user's rights.
 RUN_GEO = "DAMJOINT_RUN_GEO"
 
 #: Relative round-off: computed coordinates, times and values that differ by less are equal.

@@ -9,8 +9,7 @@ import signal
 import sys
 from types import FrameType
 
-#: Least address space [bytes] (`ulimit -v`); below it the libraries do not load or wait for memory
-#: for ever.
+#: Least address space [bytes] (`ulimit -v`); below it the libraries do not load, or wait for ever.
 LEAST_ADDRESS_SPACE = 0.9e9
 #: Below this [bytes] the libraries run in one thread, as each thread takes address space.
 THREADED_ADDRESS_SPACE = 8e9

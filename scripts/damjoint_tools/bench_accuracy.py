@@ -216,9 +216,7 @@ def estimates(measurements: Measurements) -> Table:
 
 
 def refined(case: Case, n: float) -> Case:
-    """Return a case with n elements along the joint, by the mesh rule of --accuracy, and each load
-    step cut in four.
-    """
+    """Return a case with n elements along the joint, as --accuracy, and load steps cut in four."""
     finer = refinement.refine_mesh(case, n / case["n_joint"])
     return replace(refinement.halve_steps(refinement.halve_steps(finer)), accuracy=None)
 

@@ -123,9 +123,7 @@ def engines(measurements: Measurements) -> Table:
 
 
 def exponents(table: Table, column: str = "dim", form: str = "{}D") -> list[str]:
-    """Fit the exponents of time and memory over the three largest sizes, in words, for each value
-    of a column.
-    """
+    """Fit exponents of time and memory over the three largest sizes, for each value of a column."""
     lines = []
     for kind in dict.fromkeys(table[column]):
         rows = [i for i, value in enumerate(table[column]) if value == kind][-3:]
@@ -278,9 +276,7 @@ def measure_joints(number: int) -> tuple[Any, ...]:
 
 
 def stress(measurements: Measurements) -> Table:
-    """Run flow with extreme parameters: apertures, stiffnesses of joint and bulk over many decades,
-    water up to the crest.
-    """
+    """Run flow with extreme parameters, over many decades, and water up to the crest."""
     grid = list(
         product(
             ("rupture", "friction"), (1e-9, 1e-8, 1e-6, 1e-4), (1e9, 1e12, 1e14), (1e10, 3e11, 3e12)

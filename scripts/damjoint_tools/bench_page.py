@@ -36,9 +36,7 @@ STYLES = {
 
 
 def draw(table: Table, path: Path) -> None:
-    """Worst error against time, log-log, with the efficient front; a column per scene, 2D above
-    3D.
-    """
+    """Worst error against time, log-log, with the efficient front; a column per scene."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.ticker import NullFormatter
@@ -139,9 +137,7 @@ def step_spread(table: Table) -> float:
 
 
 def modelings(measurements: Measurements, cases: Table) -> Table:
-    """Table of README.md: the subject of each modeling, the worst difference of its compared rows,
-    and the seconds.
-    """
+    """Table of README.md: subject of each modeling, worst difference of its rows, seconds."""
     columns = "shows", "rows", "worst difference", "seconds", "published code", "times faster"
     table = Table("modelings", "case", *columns)
 

@@ -55,9 +55,7 @@ def levels(power: int) -> list[float]:
 
 
 def tips(variation: Variation) -> list[str]:
-    """The crack at the levels: its broken and open length and, with what softens ahead of it, up to
-    where it reaches [m].
-    """
+    """The crack at the levels: broken and open length and, with what softens, its end [m]."""
     given = ",".join(map(repr, levels(variation.power)))
     results = LoadStepper(load("icold1999", variation.settings, given)).run()
     cells = []

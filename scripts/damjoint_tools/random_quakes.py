@@ -245,9 +245,7 @@ def block(rng: RandomNumbers, scene: RandomQuake, solid: bool) -> RandomQuake:
 
 
 def random_record(rng: RandomNumbers) -> np.ndarray:
-    """Draw a record: three waves that begin and end smoothly, up to 1 g, the vertical component
-    smaller.
-    """
+    """Draw a record: three smooth waves, up to 1 g, the vertical component smaller."""
     times = np.arange(0, rng.uniform(0.8, 1.6), RECORD_STEP)
     window = np.sin(np.pi * times / times[-1]) ** 2
     waves = [

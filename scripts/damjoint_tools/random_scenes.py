@@ -358,9 +358,7 @@ def with_lifts(scene: RandomScene, rng: RandomNumbers) -> RandomScene:
 
 
 def of_joints(drawn: list[Drawn]) -> Drawn:
-    """Return the settings of OF_JOINTS with a value for each joint, by default that of its
-    declaration.
-    """
+    """Return the settings of OF_JOINTS for each joint, by default those of the declarations."""
     names = [n for n in OF_JOINTS if any(n in joint for joint in drawn)]
     default = {name: declared()[name].default for name in names}
     return {n: tuple(joint.get(n, default[n]) for joint in drawn) for n in names}
@@ -462,9 +460,7 @@ def joint(rng: RandomNumbers) -> Drawn:
 
 
 def drains(rng: RandomNumbers, settings: Drawn) -> Drawn:
-    """Draw whether there are drains where the water flows; position, effectiveness and outlet level
-    of all drains.
-    """
+    """Draw whether there are drains where water flows; their position, effectiveness, outlet."""
     drawn: Drawn = {"drains": 1} if settings["uplift"] == "flow" and rng.event(0.4) else {}
     if not has_drains({"drains": 0} | settings | drawn) or rng.event(0.5):
         return drawn

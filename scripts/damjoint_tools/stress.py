@@ -146,9 +146,7 @@ def limit() -> None:
 def with_further_checks(
     scene: RandomQuake, run: Witness, folder: Path, row: dict[str, object]
 ) -> dict[str, object]:
-    """Return the numbers of the further checks of a verified earthquake, and its class and findings
-    with theirs.
-    """
+    """Return numbers of further checks of a verified earthquake, and its class and findings."""
     if row["class"] != VERIFIED:
         return {}
     runs = itertools.count(1)
@@ -235,9 +233,7 @@ def verified(run: Witness) -> dict[str, object]:
 
 
 def row_of(seed: int, number: int, records: Path | None, parent: Path) -> dict[str, object]:
-    """Return the row of a scene; records: folder of the records of earthquakes; parent: of the
-    folder of its runs.
-    """
+    """Return the row of a scene; records: folder of records; parent: of the folder of its runs."""
     tempfile.tempdir = str(parent)  # of all that this process writes, as it may be killed
     scene = random_quake(seed, number, records) if records else random_scene(seed, number)
     with tempfile.TemporaryDirectory() as folder:

@@ -266,9 +266,7 @@ FEATURES = {
 
 
 def classes(rows: list[Row], *names: str, with_words: dict[str, str] | None = None) -> str:
-    """Return the table of the scenes of each class, by the values of columns (no lists), and by
-    parts of the command.
-    """
+    """Return the table of the scenes of each class, by columns and by parts of the command."""
     lines: list[tuple[Any, ...]] = []
     for name in names:
         values = sorted({row[name] for row in rows if "," not in row[name]})

@@ -96,8 +96,7 @@ def element_stiffness(
     return block.reshape(len(table), n * dim, n * dim)
 
 
-#: Distortion up to which an element counts as affine, relative to its size: rounding of Gmsh's
-#: nodes.
+#: Distortion over the size up to which an element counts as affine: rounding of Gmsh's nodes.
 DISTORTION = 1e-9
 
 

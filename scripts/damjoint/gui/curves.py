@@ -54,8 +54,7 @@ def show_graphs(graphs: Graphs, scene: SolvedScene, before: Sequence[SolvedScene
     graphs.write_names()
 
 
-#: Curves of an earthquake over time, the most important first: title, units, curves (name, column
-#: of quake.csv, color).
+#: Curves of an earthquake, the most important first: title, units, (name, column, color) of each.
 OVER_TIME: tuple[tuple[str, Units, tuple[tuple[str, str, Color], ...]], ...] = (
     ("ground", ACCELERATIONS, (("x", "ground_ax", DARK), ("y", "ground_ay", ORANGE))),
     ("crest movement", LENGTHS, (("", "crest_ux", BLUE),)),

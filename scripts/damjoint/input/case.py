@@ -43,8 +43,7 @@ SHARED = (
 #: Those of them that the laws use.
 SOLVER = "artificial", "yield_tolerance", "release_length"
 
-#: Variables of pro/section.pro: the joint's ends, the segments of the faces, the marks of line
-#: forces.
+#: Variables of pro/section.pro: ends of the joint, segments of the faces, marks of line forces.
 SECTION = (
     *("heel_x", "heel_y", "toe_x", "toe_y", "joint_length", "joint_along"),
     *("seg_side", "seg_body", "seg_x0", "seg_y0", "seg_x1", "seg_y1"),

@@ -102,7 +102,7 @@ class Bond(SofteningLaw[BondVariables]):
 
     def slip_opening(self, excess: Array, size: Array, opened: Array) -> Array:
         """The slip (q,) [m] if the damage by opening governs."""
-        beyond_yield = excess - self.cohesion * self.curve.left(opened)
+        beyond_yield = excess - self.cohesion * self.curve.remaining(opened)
         return np.where(beyond_yield > self.yield_tolerance * size, beyond_yield / self.K_T, 0)
 
     def slip_and_damage(
@@ -219,7 +219,7 @@ class Bond(SofteningLaw[BondVariables]):
 
     def cohesion_left(self, jump: Array, variables: BondVariables) -> Array:
         """See `Law`."""
-        return self.curve.left(variables.progress)
+        return self.curve.remaining(variables.progress)
 
     def opening_of_crack(self, variables: BondVariables, points: int) -> Array:
         """See `Law`."""

@@ -29,8 +29,7 @@ BROKEN = 0.7203615675
 LEAST = 1e-18
 #: Largest damage [-], at which S = 1e-36.
 LARGEST = 1 - 1e-12
-#: Most iterations for the damage, as in pro/law_endo.pro; usually 3 to 7. The bracket is then at
-#: most 2e-8 wide.
+#: Most iterations for the damage, as in pro/law_endo.pro; usually 3 to 7. Then a bracket <= 2e-8.
 MOST_ITERATIONS = 32
 #: Where they end: change of log(alpha/(1 - alpha)) [-]. Newton's method has then rounded digits.
 ACCURACY = 1e-10

@@ -143,8 +143,8 @@ class Mixed(SofteningLaw[MixedVariables]):
 
     def shear_strength(self, sigma_n: Array, damage: Array | float, slip: Array | float) -> Array:
         """See `Law`: sqrt(K_T/K_N) times what f_t (1 - D) leaves beside the tension."""
-        left = self.tensile_strength * (1 - damage)
-        beside = np.maximum(left**2 - np.maximum(sigma_n, 0) ** 2, 0)
+        strength = self.tensile_strength * (1 - damage)
+        beside = np.maximum(strength**2 - np.maximum(sigma_n, 0) ** 2, 0)
         return np.sqrt(self.ratio * beside)
 
     def tension_left(self, damage: Array) -> Array:

@@ -53,7 +53,7 @@ class Rupture(SofteningLaw[RuptureVariables]):
         self.delta_e = p["sigma_max"] / self.K_N
         self.L_C = (1 + penalty) * self.delta_e
         self.sigma_c = p["sigma_max"] * (1 + penalty) / penalty  # the line at no opening
-        #: opening at which nothing is left [m]
+        #: opening at which nothing remains [m]
         self.L_end = self.L_C
         if self.curve.end > 1:
             self.L_end = self.delta_e + self.curve.end * (self.L_C - self.delta_e)
@@ -149,7 +149,7 @@ class Rupture(SofteningLaw[RuptureVariables]):
         """Normal stress of an opening that is the largest so far (q,)."""
         if self.curve.name == "linear":  # as published
             return np.asarray(self.sigma_c * (1 - opening / self.L_C))
-        return self.tensile_strength * self.curve.left(self.progress(opening))
+        return self.tensile_strength * self.curve.remaining(self.progress(opening))
 
     def softening_slope(self, opening: Array) -> Array | float:
         """Its derivative with the opening (q,)."""

@@ -1,7 +1,7 @@
 """The softening curves of the laws bond and rupture, as in pro/softening.pro.
 
-What is left of a strength follows from the progress xi: the opening beyond the strength, or the
-slip, over the length at which linear softening of the same energy ends. The area below what is left
+What remains of a strength follows from the progress xi: the opening beyond the strength, or the
+slip, over the length at which linear softening of the same energy ends. The area below what remains
 is 1/2 on both curves, so that the fracture energies do not depend on the curve.
 """
 
@@ -16,13 +16,13 @@ class Linear:
     """1 - xi, up to xi = 1."""
 
     name = "linear"
-    #: progress [-] from which on nothing is left
+    #: progress [-] from which on nothing remains
     end = 1.0
-    #: largest slope of what is left [-]
+    #: largest slope of what remains [-]
     steepest = 1.0
 
-    def left(self, progress: Array) -> Array:
-        """What is left of a strength (q,), 1 to 0."""
+    def remaining(self, progress: Array) -> Array:
+        """What remains of a strength (q,), 1 to 0."""
         return 1 - progress
 
     def damage(self, progress: Array) -> Array:
@@ -45,9 +45,8 @@ class Linear:
     def slip(
         self, excess: Array, stiffness: float, strength: float, progress: Array, per_slip: float
     ) -> Array:
-        """The slip s (q,) [m] at which excess - stiffness s is what is left of a strength, after a
-        progress that grows by per_slip s; excess [Pa] >= strength left(progress), elsewhere the
-        value has no meaning.
+        """The slip s (q,) [m] at which excess - stiffness s is what remains of a strength, after a
+        progress that grows by per_slip s; without meaning if excess < strength remaining(progress).
         """
         return (excess - strength * (1 - progress)) / (stiffness - strength * per_slip)
 
@@ -60,7 +59,7 @@ class Exponential(Linear):
     end = 20.0
     steepest = 2.0
 
-    def left(self, progress: Array) -> Array:
+    def remaining(self, progress: Array) -> Array:
         """See `Linear`."""
         return np.asarray(np.exp(-2 * np.maximum(progress, 0)))
 
@@ -70,14 +69,14 @@ class Exponential(Linear):
 
     def rate(self, progress: Array) -> Array:
         """See `Linear`."""
-        return 2 * self.left(progress)
+        return 2 * self.remaining(progress)
 
     def unloading(
         self, progress: Array, strength: float, begin: float, end: float
     ) -> tuple[Array, Array]:
         """See `Linear`."""
         opening = begin + progress * (end - begin)
-        stiffness = strength * self.left(progress) / opening
+        stiffness = strength * self.remaining(progress) / opening
         return stiffness, -stiffness * (2 + (end - begin) / opening)
 
     def slip(
@@ -86,11 +85,11 @@ class Exponential(Linear):
         """See `Linear`: u = 2 per_slip s is the root of u + q (exp(-u) - 1) = v, q < 1; Newton's
         method from above, where it is monotone.
         """
-        left = strength * self.left(progress)
+        remaining = strength * self.remaining(progress)
         if not per_slip:
-            return (excess - left) / stiffness
+            return (excess - remaining) / stiffness
         scale = 2 * per_slip / stiffness
-        q, v = scale * left, np.maximum(scale * (excess - left), 0)
+        q, v = scale * remaining, np.maximum(scale * (excess - remaining), 0)
         u = 2 * v / (1 - q + np.sqrt((1 - q) ** 2 + 4 / 3 * q * v))  # exp(-u) > 1 - u + u^2/3
         u = np.where(u <= 1, u, v + q)
         for _ in range(NEWTON_STEPS):
@@ -98,7 +97,7 @@ class Exponential(Linear):
         return np.asarray(u / (2 * per_slip))
 
 
-#: Steps of Newton's method [-]: the largest relative error left by three is 3e-8.
+#: Steps of Newton's method [-]: the largest relative error after three is 3e-8.
 NEWTON_STEPS = 5
 #: By the parameter `softening`.
 CURVES: dict[str, Linear] = {curve.name: curve for curve in (Linear(), Exponential())}

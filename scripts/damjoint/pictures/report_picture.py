@@ -17,8 +17,7 @@ from .drawing import runs_of
 
 #: Resolution of the rasterised parts of a picture.
 DPI = 160
-#: Least value of a white pixel; least height of a band over its width, of the first one with its
-#: heading.
+#: Least value of a white pixel; least height of a band over its width, of the first with heading.
 WHITE, LEAST_BAND, FIRST_BAND = 250, 0.1, 0.3
 
 

@@ -20,8 +20,7 @@ LEAST_FOUNDATION = 1.5
 SOFT_JOINT = 1
 #: Bulk modulus of water [Pa].
 WATER_MODULUS = 2.2e9
-#: Change of the pressure of water in time in a step, over that of the highest water, beyond which
-#: it is noted [-].
+#: Change of pressure in a step of water in time, over that of the highest water, that is noted [-].
 LARGE_MOVE = 0.5
 
 

@@ -22,16 +22,14 @@ from ..units import STRESSES, with_unit
 FINITE_ELEMENTS, GRAVITY = "finite elements", "gravity method"
 LONGER = "gravity method, longer crack"
 DIFFERENCE, REQUIRED = "difference", "required"
-#: Verdicts: nothing fails and nothing is required; nothing fails, but not all that is required
-#: could be judged.
+#: Verdicts; the last two: nothing is required; not all that is required could be judged.
 FAIL, PASS, UNCHECKED, NOT_JUDGED = "fail", "pass", "not checked", "not judged"
 #: Parameters that set requirements.
 REQUIREMENTS = ("required_SSF", "required_OSF", "f_c", "required_position")
 #: Value of a requirement that requires nothing.
 NOTHING = 0.0, "any"
 
-#: Columns of check.csv: a row per scene, joint and method at the last level, and one of
-#: differences.
+#: Columns of check.csv: a row per scene, joint and method at the last level; differences.
 CHECK = {
     "case": ("", "name of the case"),
     "joint": ("", "name of the joint: base, lift at a height"),

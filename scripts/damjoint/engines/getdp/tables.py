@@ -25,8 +25,7 @@ from ...model.results import (
 from ...storage import check_end
 from .process import numbers
 
-#: Columns of history.txt (pro/step_control.pro), after the word "step"; and of joints.txt, after
-#: "joint".
+#: Columns of history.txt (pro/step_control.pro) after "step"; of joints.txt after "joint".
 PRINTED = [
     *("time", "level", "iterations", "cuts", "residual", "crest_ux", "heel"),
     *("load_factor", "point_u"),
