@@ -160,6 +160,8 @@ def test_files_repeat_the_calibrated_run(tmp_path, command, texts_drawn):
     assert command("report", str(out), "--to", "report.html")[0] == 0
     page = (tmp_path / "report.html").read_text()
     assert "<h3>Calibration</h3>" in page and info["calibration"]["verdict"] in page
+    low, high = (f"<td>{float(row[end]) / 1e9:.4g}</td>" for end in ("low", "high"))
+    assert "12 measured values" in page and low in page and high in page
     again = dj.run(dj.case(out / "calibrated.case"))
     crest = [float(r["computed"]) for r in rows if r["series"] == "crest_ux"]
     assert_allclose(again.history.crest_ux[-6:], crest, rtol=1e-6)

@@ -1068,6 +1068,15 @@ def test_the_fragility_of_a_block_is_that_of_newmarks_slips(command, tmp_path):
     numbers = [sum(abs(float(r["residual_slip"])) > v for r in rows) for v in (0.01, 0.03)]
     assert [float(r["exceed"]) for r in table] == [*numbers, 0]
     assert "no row exceeds it" in table[2]["reason"] and "Fragility, lognormal in peak_" in out
+    assert command("report", "f.csv")[0] == 0
+    page = (tmp_path / "report.html").read_text()
+    for text in ("<td>0.9, 1.4, 2", "a.csv, b.AT2", "residual slip &gt; 30 mm", table[2]["reason"]):
+        assert text in page, text
+    assert "Joint law friction" in page
+    (tmp_path / "f_fragility.csv").unlink()
+    code, _, err = command("report", "f.csv", "--to", "other.html")
+    assert code == 2 and "its fragility, f_fragility.csv" in err
+    assert not (tmp_path / "other.html").exists()
 
 
 def quake_rows(name, values, slips, verdicts):

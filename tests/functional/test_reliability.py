@@ -204,6 +204,17 @@ def test_files_and_continuation(command, tmp_path):
     assert (tmp_path / "out/dam_reliability.png").stat().st_size > 10_000
     assert info["state"] == "complete" and info["reliability"]["critical_levels"] == len(levels)
     assert entry["agreement"] in out and f"{entry['form']:.4g}" in out
+    assert command("report", "out", "--to", "report.html")[0] == 0
+    page = (tmp_path / "report.html").read_text()
+    for text in (
+        *(f"<td>{v}</td>" for v in (MU, "normal(2400,50)", "gumbel_r(38.5,0.6)", "2400")),
+        *(entry["agreement"], f"<td>{entry['beta']:.4g}</td>", "SORM, Tvedt", "reservoir level"),
+        f"<td>{100 * entry['importance']['mu']:.3g}</td>",
+        "P = {:.3g} ({:.3g} to {:.3g})".format(entry["sampled"], *entry["interval"]),
+        *(f"All {len(levels)} critical levels are confirmed", "data:image/png;base64,"),
+        *("Joint law friction", "<code>mu</code>"),  # of the case itself, and its materials
+    ):
+        assert text in page, text
     case = load(str(tmp_path / "out/design_point.case"))
     assert case["mu"] == entry["design_point"]["mu"] and case["law"] == "friction"
     assert Search(case, "level").find().value == pytest.approx(case.levels[-1], rel=1e-4)

@@ -7,13 +7,17 @@ from pathlib import Path
 
 from .options import Parser
 
-SUMMARY = "write a report on runs, as HTML or PDF"
+SUMMARY = "write a report on runs and studies, as HTML or PDF"
 
 
 def add(command: Parser) -> None:
     """Add the options."""
     command.add_path(
-        "out", "FOLDER", nargs="+", help="output folders of runs, or that of damjoint check"
+        "out",
+        "FOLDER",
+        nargs="+",
+        help="output folders of runs, of damjoint check, reliability or calibrate, or the CSV file "
+        "of a sweep with its fragility",
     )
     command.add_path(
         "--to",

@@ -201,29 +201,35 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
         folder / RECORD,
         {
             "case": case.name,
-            "title": case.title,
             "state": state or (STOPPED if results.stopped else COMPLETE),
             "verdict": state or verdict(results),
             "statement": why or statement(results),
             "hints": hints(results),
-            "parameters": case.values,
-            **{name: getattr(case, name) for name in GEOMETRY_LISTS},
-            "joints": [stored(case, joint) for joint in case.of_joints],
-            "levels": case.levels,
-            "tail_levels": case.tail_levels,
-            "times": case.times,
-            "geometry": str(case.geometry or ""),
-            "section": case.section
-            if case.geometry
-            else {},  # a section by parameters is computed again
-            "published": case.published,
-            "hardening_requested": case.hardening_requested,
+            **entries_of(case),
             **results.info,
             "units": {
                 n: unit for n, (unit, _) in (joint_columns(case) | history_columns(case)).items()
             },
         },
     )
+
+
+def entries_of(case: Case) -> dict[str, Any]:
+    """The entries of run.json from which `post.stored` builds a case again."""
+    return {
+        "title": case.title,
+        "parameters": case.values,
+        **{name: getattr(case, name) for name in GEOMETRY_LISTS},
+        "joints": [stored(case, joint) for joint in case.of_joints],
+        "levels": case.levels,
+        "tail_levels": case.tail_levels,
+        "times": case.times,
+        "geometry": str(case.geometry or ""),
+        # a section by parameters is computed again
+        "section": case.section if case.geometry else {},
+        "published": case.published,
+        "hardening_requested": case.hardening_requested,
+    }
 
 
 def stored(case: Case, joint: OfJoint) -> dict[str, Any]:

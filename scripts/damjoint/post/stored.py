@@ -48,7 +48,7 @@ def read(folder: Path) -> Solution:
     """
     info = read_info(folder) or {}
     state = info.get("state", "unknown")
-    if state == "complete" and "levels" not in info:
+    if state == "complete" and ("levels" not in info or "reliability" in info):
         raise InputError(f"out = {folder}: must be of run, check, critical or quake")
     if "parameters" not in info:
         raise InputError(f"out = {folder}: must be a run with results; its state is {state}")

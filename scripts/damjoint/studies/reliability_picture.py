@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from ..pictures.drawing import BLUE, DARK, figure_of, panels, picture_style, write_picture
 from .reliability import Reliability
@@ -16,6 +17,8 @@ from .reliability import Reliability
 #: Width of the picture, height of a row, of the space around the rows, and of a line of the heading
 #: [inches]; letters in a line.
 WIDTH, ROW, AROUND, LINE, LETTERS = 11.5, 0.3, 1.1, 0.2, 140
+#: Labels in a decade of an axis of less than two decades.
+FEW = (1, 2, 5)
 
 
 def draw(results: Sequence[Reliability], title: str, values: Sequence[str], path: Path) -> None:
@@ -75,7 +78,11 @@ def draw_probabilities(axes: Axes, rows: Sequence[Row]) -> None:
     axes.set_yticks(range(len(rows)), [name for name, *_ in rows])
     if rows:
         shown = np.array([row[1:] for row in rows])
+        least, most = np.nanmin(shown[shown > 0]) / 2, min(1.0, np.nanmax(shown) * 2)
         axes.set_xscale("log")
-        axes.set_xlim(np.nanmin(shown) / 2, min(1.0, np.nanmax(shown) * 2))
+        axes.set_xlim(least, most)
+        axes.xaxis.set_major_locator(LogLocator(subs=FEW if most < 100 * least else (1,)))
+        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set(ylim=(len(rows) - 0.5, -0.7), xlabel="probability [-]")
     axes.grid(axis="x", alpha=0.3)

@@ -13,6 +13,7 @@ from tabulate import tabulate
 from ..input.case import Case
 from ..input.parameters import parameter
 from ..input.written_case import case_text
+from ..post.folder import entries_of
 from ..processes import check_jobs
 from ..progress import Progress
 from ..session import session
@@ -88,7 +89,7 @@ def reliability(
             ]
             path = out / f"{case.name}{PICTURE}"
             reliability_picture.draw(results, heading(levels), values, path)
-        entries = {"reliability": as_json(levels, results), "parameters": case.values}
+        entries = {"reliability": as_json(levels, results), **entries_of(case)}
         study.save_without_results("complete", "", entries)
     return results, printed_lines(levels, results, out)
 
@@ -181,7 +182,7 @@ def printed_lines(levels: CriticalLevels, results: Sequence[Reliability], out: P
     if levels.unconfirmed:
         lines.append(f"{levels.unconfirmed} of {count} critical levels are not confirmed")
     design = [
-        (name, f"{value:.6g}", unit_of(name), f"{100 * whole.importance[name]:.3g}")
+        (name, f"{value:.6g}", unit_of(name), f"{round(100 * whole.importance[name], 2):.3g}")
         for name, value in whole.design.items()
     ]
     heads = ["design point", "value", "unit", "importance [%]"]

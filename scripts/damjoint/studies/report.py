@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import logging
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -33,7 +33,7 @@ from ..statics.rigid_block import force, resultant_of
 from ..statics.verdict import stiffness_ratio
 from ..storage import atomic_write
 from ..units import FORCES, MOMENTS, Units, unit, unit_of_time
-from . import body_stress, report_input, report_quake
+from . import body_stress, report_input, report_quake, report_studies
 from .check import (
     NOT_JUDGED,
     REQUIRED,
@@ -48,6 +48,7 @@ from .check import (
 )
 from .check_tables import SHOWN
 from .report_input import Entry, by_runs, in_table
+from .report_studies import StudySection
 
 #: Sizes of the pictures [inches]: half of the page's width; its width; its width, in 3D.
 HALF, WIDE, SOLID = (5.2, 4.9), (10.6, 2.1), (10.6, 4.4)
@@ -116,6 +117,8 @@ class RunSection:
     joints_note: str
     #: of `damjoint quake`; else None
     earthquake: report_quake.Earthquake | None
+    #: of `damjoint calibrate`, else empty: sentences, tables by their headings
+    calibration: tuple[list[str], dict[str, Table]]
     #: by their headings: flow in time, calibration, if they were drawn
     further: dict[str, Picture]
     #: level of the last state, as text; the same with what it is, of an earthquake
@@ -153,17 +156,21 @@ def write(folders: list[Path], to: Path, dam: str = "") -> None:
     """Write the report on the runs in folders, those of their further scenes included: a PDF if its
     name ends in .pdf, else HTML. dam: its name, by default the title of the runs.
 
-    A folder of `damjoint check` has a run per load combination. Raises InputError if a folder is
+    A folder of `damjoint check` has a run per load combination; that of a reliability, or the CSV
+    file of a sweep with its fragility, is a study. Raises InputError if a folder is
     not that of a run, or the file can not be written; RunError if weasyprint is not installed.
     """
     rendered = renderer(to)
-    runs = [run for folder in folders for part in parts_of(folder) for run in stored.runs_in(part)]
-    inside = any(run.resolve() in to.resolve().parents for run in runs)
+    paths = [path for folder in folders for path in sections_in(folder)]
+    inside = any(path.resolve() in to.resolve().parents for path in paths)
     if to.is_dir() or (inside and to.suffix.lower() not in (".html", ".pdf")):
         raise InputError(
             f"to = {to}: must be a file; in the folder of a run it must end in .html or .pdf"
         )
-    sections = [read_section(folder, number) for number, folder in enumerate(runs, start=1)]
+    sections = [
+        report_studies.read(path, number) if is_study(path) else read_section(path, number)
+        for number, path in enumerate(paths, start=1)
+    ]
     page = rendered(page_of(sections, dam))
     try:
         with atomic_write(to) as path:
@@ -218,8 +225,21 @@ class ErrorLog(logging.Handler):
         self.messages.append(record.getMessage())
 
 
-def page_of(sections: list[RunSection], dam: str = "") -> str:
-    """Render the page; dam: its name, by default the title that all runs have."""
+def is_study(path: Path) -> bool:
+    """Whether a path is of a reliability or, as a CSV file, of a sweep; else of a run."""
+    return path.suffix == ".csv" or report_studies.is_reliability(path)
+
+
+def sections_in(path: Path) -> list[Path]:
+    """The runs and studies in a folder, or a study itself. Raises InputError."""
+    if is_study(path):
+        return [path]
+    return [run for part in parts_of(path) for run in stored.runs_in(part)]
+
+
+def page_of(sections: Sequence[RunSection | StudySection], dam: str = "") -> str:
+    """Render the page; dam: its name, by default the title that all sections have."""
+    runs = [section for section in sections if isinstance(section, RunSection)]
     titles = {section.title for section in sections}
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
@@ -228,22 +248,24 @@ def page_of(sections: list[RunSection], dam: str = "") -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    rows = [(f"{i}", *s.computation.values()) for i, s in enumerate(sections, start=1)]
-    heads = ["run", *sections[0].computation]
+    rows = [(f"{run.number}", *run.computation.values()) for run in runs]
+    heads = ["run", *runs[0].computation] if runs else []
     entries = by_runs([section.other_input for section in sections])
     listed = {name for name, entry, _ in entries if in_table(name, entry)}
     return environment.get_template("report.html.j2").render(
-        runs=sections,
+        sections=sections,
+        runs=runs,
+        studies=[section for section in sections if isinstance(section, StudySection)],
         dam=dam or (titles.pop() if len(titles) == 1 else ""),
         corner=f"{body_stress.CORNER:.0%}",
-        summary=summary_table(sections),
-        of_joints=any(name for section in sections for name in section.summary),
+        summary=summary_table(runs),
+        of_joints=any(name for run in runs for name in run.summary),
         computations=Table(heads, ["" for _ in heads], rows),
         materials=by_runs([section.materials for section in sections]),
         other_input=[row for row in entries if row[0] in listed],
         at_default=[row for row in entries if row[0] not in listed],
         limits=by_runs([dict.fromkeys(section.limits, "") for section in sections]),
-        errors=by_runs([{section.error: ""} for section in sections]),
+        errors=by_runs([{run.error: ""} for run in runs]),
         versions=by_runs([section.versions for section in sections]),
         version=__version__,
         now=f"{datetime.now():{MINUTE}}",
@@ -269,10 +291,10 @@ def parts_of(folder: Path) -> list[Path]:
     return [folder / name for name in names]
 
 
-def summary_table(sections: list[RunSection]) -> Table:
+def summary_table(runs: list[RunSection]) -> Table:
     """Tabulate the last state of each run, a row for each of its joints."""
     columns = list[Column]()
-    states = [state for section in sections for state in section.summary.values()]
+    states = [state for run in runs for state in run.summary.values()]
     for name, head, units in SUMMARY:
         values = np.array([state.get(name, math.nan) for state in states])
         if np.isfinite(values).any():
@@ -334,6 +356,7 @@ def run_section(folder: Path, number: int, solution: Solution) -> RunSection:
         else None,
         joints_note=joints_note(case),
         earthquake=report_quake.read(folder, case, info),
+        calibration=report_studies.calibration(folder, info) if "calibration" in info else ([], {}),
         further=further_pictures(folder, result),
         level=f"{last['level']:.4g} m" if last else "",
         state=state_of_last(last, info.get("quake")),
@@ -346,7 +369,7 @@ def run_section(folder: Path, number: int, solution: Solution) -> RunSection:
         materials=report_input.materials(case),
         other_input=report_input.other_input(case),
         limits=[*report_input.limits(case, earthquake="quake" in info)],
-        versions=versions(info),
+        versions=report_studies.versions(info),
     )
 
 
@@ -363,7 +386,7 @@ def further_pictures(folder: Path, result: Results) -> dict[str, Picture]:
         pictures["Flow in time"] = Picture("bands", caption, bands(water))
     calibration = result.info.get("calibration")
     if fit.is_file() and calibration:
-        pictures["Calibration"] = Picture("bands", calibration["verdict"], bands(fit))
+        pictures["Calibration"] = Picture("bands", "", bands(fit))
     return pictures
 
 
@@ -676,9 +699,3 @@ def computation(result: Results) -> dict[str, str]:
         "engine": info["engine"],
         "time [s]": f"{sum(info['wall_seconds'].values()):.2g}",
     }
-
-
-def versions(info: Info) -> dict[str, str]:
-    """Versions, factorisation and machine of a run; runs of earlier versions lack some."""
-    others = {name: info.get(name) for name in ("commit", "factorisation", "machine")}
-    return info["versions"] | {name: str(text) for name, text in others.items() if text}

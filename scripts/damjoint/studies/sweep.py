@@ -22,6 +22,7 @@ from ..input.resolve import equal_steps, resolve, with_drive_times
 from ..input.source import Source
 from ..joint.interface import Interface, interface_of
 from ..model.results import history_columns
+from ..post.folder import entries_of
 from ..post.summary import Draw, aligned, fitted
 from ..processes import ProcessKilled, as_finished, check_jobs, number_of
 from ..progress import Progress, track
@@ -339,7 +340,7 @@ class PlannedRows:
         about = {"rows": len(self.planned), "vary": plan.varied, "sample": [*plan.sampled]}
         limits = plan.quake and plan.quake.listed
         about |= {"tie": plan.tied, "critical": plan.critical, "limits": limits}
-        return {"sweep": about, "parameters": case.values, "levels": case.levels}
+        return {"sweep": about, **entries_of(case)}
 
     def missing(self, known: Container[str] = ()) -> dict[str, Task]:
         """The tasks of the rows whose keys are not known."""
