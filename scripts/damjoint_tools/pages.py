@@ -253,6 +253,8 @@ def validation_pages() -> None:
         if family != "ssnp142":
             others += [f"## {family.upper()}", f"{shows[0].upper()}{shows[1:]}."]
             others += [report(rows[family], "github")]
+        if family == "ssnp133":
+            others += [ON_MESHES, plate_on_meshes()]
         if family == "sdnv138":
             others += [QUAKES, quake_conventions(rows[family])]
     others.append(icold_section())
@@ -265,6 +267,38 @@ def validation_pages() -> None:
     heads = "family", "shows", "rows", "passed", "worst, of its tolerance"
     readme = Path("README.md")
     readme.write_text(between("families", readme.read_text(), markdown(lines, heads)))
+
+
+#: Published points of the path of SSNP133 [m], of which the last is not judged.
+PLATE = (1.15791783e-3, 5.20165353e-3, 7.72441193e-3)
+ON_MESHES = (
+    "The published values are those of a coarse mesh: the process zone, "
+    "$E G_f/\\sigma_{max}^2$ = 75 m, is about as long as an element of the ligaments, so that the "
+    "path is jagged, a tooth for each element that breaks. Some twenty meshes with as many "
+    "elements (Gmsh's four algorithms, a division of an edge more or less) give -2.4 to +0.4 %, "
+    "-2.1 to +0.9 % and, at the third published point, 7.724e-3 m at 4.74e6 N, -4.5 to +7 %. This "
+    "one was chosen among them, so that 0.5 % at the first two points means that such a mesh "
+    "exists; the third is not judged. On finer meshes all three converge, to other values; Gauss "
+    "points, steps and a tangential stiffness ten times smaller change the third by less than "
+    "0.1 %. How far the path is from the published points, on this mesh and finer ones:"
+)
+
+
+def plate_on_meshes() -> str:
+    """Table of SSNP133 on meshes of both orders: how far the path is from its published points."""
+    from damjoint.input.resolve import load
+    from damjoint.runner import compute
+    from damjoint.verification.path_tests import read, ssnp133
+
+    lines = []
+    for order in (1, 2):
+        for finer in (1, 2, 4, 8):
+            case = load("ssnp133", {"order": order, "n_joint": 10 * finer})
+            path = read(ssnp133()["A"], compute(case, fields=False).result.history)
+            apart = (f"{v / wanted - 1:+.1%}" for v, wanted in zip(path, PLATE, strict=True))
+            lines.append((order, 19 * finer, *apart))
+    heads = ("order", "elements on the joints", "1.0e7 N, falling", "1.1e7 N", "4.74e6 N, falling")
+    return markdown(lines, heads)
 
 
 def quake_conventions(published: list[Comparison]) -> str:
@@ -371,10 +405,9 @@ OTHERS = (
     "test moves one side of the blocks; here they are warmed to the same effect. The shear of a "
     "few Pa in E to H comes from the mesh, the two blocks are symmetric; it is not judged.\n\n"
     "SSNP133: about as many elements as published; the triangles of the published mesh are not "
-    "known. The path is jagged, a tooth for each element that breaks: at the third published "
-    "point, 7.724e-3 m at 4.74e6 N, meshes with the same numbers of elements give -3 to +7 %, so "
-    "it is not judged. SSNP166: the support holds the end face; at a point, as published, it "
-    "would make a dent that depends on the mesh.\n\n"
+    "known. Its published values are those of its coarse mesh, see below. SSNP166: the support "
+    "holds the end face; at a point, as published, it would make a dent that depends on the "
+    "mesh.\n\n"
     "SSNP162: B, C, M, N and O are A on other elements, F, Q and R are E, H and I are G, P is D, "
     "K and L are J. The closed form of D II leaves out the hardening that the published code and "
     "we have. In SSNP164 C the shear across the joint is not judged: the published code has "
@@ -396,8 +429,10 @@ OTHERS = (
 def icold_section() -> str:
     """The section of published.md on a dam whose cracks are not judged, computed again."""
     from .icold import ABOUT, table
+    from .provenance import provenance, source_line
 
-    return "\n\n".join(["<!-- icold -->", ABOUT, table(), "<!-- /icold -->"])
+    source = source_line([provenance()], "Computed")
+    return "\n\n".join(["<!-- icold -->", ABOUT, source, table(), "<!-- /icold -->"])
 
 
 def tour_page() -> str:
