@@ -64,9 +64,7 @@ def unraisable(ignored: "sys.UnraisableHookArgs") -> None:
 
 
 def handle_signals() -> None:
-    """Let SIGTERM and SIGHUP (closed terminal) end a command as Ctrl-C does; signals that are
-    ignored (nohup) stay ignored.
-    """
+    """Let SIGTERM and SIGHUP end a command as Ctrl-C does; ignored signals (nohup) stay so."""
     sys.unraisablehook = unraisable
     for number in INTERRUPTS:
         if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):

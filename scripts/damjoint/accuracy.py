@@ -176,9 +176,7 @@ def refine_until_accurate(
 
 
 def can_resolve(result: Results, finest: float) -> bool:
-    """Whether the fracture process zone of a joint has too few elements, but enough of them with
-    the most elements along the joint.
-    """
+    """Whether a process zone has too few elements, but enough with the most along the joint."""
     return any(
         zone.least <= finest for joint in result.joints for zone in process_zone.too_short(joint)
     )

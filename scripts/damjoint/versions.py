@@ -39,9 +39,7 @@ def code_fingerprint(*packages: Path) -> str:
 
 
 def provenance(getdp: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entries of run.json on memory, versions, commit and machine; getdp: version and
-    peak_memory_mb of GetDP, if it was used.
-    """
+    """Return run.json's memory, versions, commit, machine; getdp: its version, peak_memory_mb."""
     numbers = versions() | ({"getdp": getdp["version"]} if getdp.get("version") else {})
     memory = max(peak_memory(), getdp.get("peak_memory_mb") or 0.0)
     return {
@@ -85,9 +83,7 @@ def git_status() -> subprocess.Popen[str] | None:
 
 @lru_cache(maxsize=1)
 def commit() -> str:
-    """Return the commit of the checkout, with a note if its code has changes; empty outside of a
-    checkout of this project.
-    """
+    """Return the commit of this project's checkout, noted if changed; or an empty text."""
     process = git_status()
     status = process.communicate()[0] if process else ""
     head = re.search("^# branch.oid ([0-9a-f]{7})", status)

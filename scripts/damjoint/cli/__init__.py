@@ -79,9 +79,7 @@ def check_encoding(word: str) -> None:
 
 
 def one_line(error: BaseException) -> str:
-    """Return the message of an error in one line; line ends and control characters, which could
-    change the terminal's state, are escaped.
-    """
+    """Return an error's message in one line; line ends and control characters are escaped."""
     escape = lambda c: c if c.isprintable() else c.encode("unicode_escape").decode()
     return "damjoint: " + "".join(map(escape, str(error)))
 
@@ -92,9 +90,7 @@ def interrupted() -> str:
 
 
 def with_negative_lists(words: list[str]) -> list[str]:
-    """Return the words with `--levels -1,3` as `--levels=-1,3`: argparse takes a word that begins
-    with a minus sign for an option.
-    """
+    """Return the words with `--levels -1,3` as `--levels=-1,3`, else an option for argparse."""
     words = list(words)
     for i in reversed(range(len(words) - 1)):
         if words[i] in ("--levels", "--tail-levels"):

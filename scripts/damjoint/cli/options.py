@@ -22,9 +22,7 @@ RESUMED = "CSV of results; rows that are already in it are not computed again"
 
 
 class Checked(argparse.Action):
-    """Action that stores `convert(name, text)`, which raises InputError. As a `type`,
-    argparse would replace its message.
-    """
+    """Stores `convert(name, text)`, or raises its InputError, which `type` would replace."""
 
     def __init__(
         self, *, convert: Callable[[str, str], object], repeats: bool = False, **options: Any

@@ -48,9 +48,7 @@ def wave_speeds(case: Case) -> Array:
 
 
 def travel_time(case: Case, interval: float) -> float:
-    """Time [s] that a wave needs from the rock's base to its surface, rounded up to a whole number
-    of intervals of a record.
-    """
+    """Time [s] of a wave from the rock's base to its surface, up to a multiple of an interval."""
     return math.ceil(case["found_depth"] / wave_speeds(case).min() / interval) * interval
 
 

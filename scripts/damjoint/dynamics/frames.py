@@ -26,9 +26,7 @@ NEAR = 1e-6
 
 @dataclass
 class Frames:
-    """The frames so far: the static state, then every `interval` within a span; at the end of a
-    record within the span its last step.
-    """
+    """The frames so far: the static state, every `interval` in a span, the record's last step."""
 
     #: [s], a multiple of the time step
     interval: float

@@ -66,9 +66,7 @@ class System:
 
     @staticmethod
     def of(case: Case, bodies: Bodies, interface: Interface) -> System:
-        """Assemble the bodies of a case, with the added mass of the reservoir at its last level;
-        with rock_mass without the supports.
-        """
+        """Assemble a case's bodies with added mass at the last level; rock_mass: no supports."""
         densities = {region: case[name] for region, name in MASSIVE.items()}
         if case["rock_mass"]:
             bodies, densities = bodies.without_supports, densities | {ROCK: case["rho_found"]}

@@ -44,9 +44,7 @@ class GluedBodies:
         return GluedBodies(bodies=bodies, size=size, free=free, numbers=numbers)
 
     def motion(self, gluing: Gluing) -> dict[str, Sparse]:
-        """By body b: T_b (degrees of freedom, n) of u_b = T_b w; w: the free displacements of the
-        glued bodies, then the jumps that part them.
-        """
+        """By body b: T_b of u_b = T_b w; w: glued bodies' displacements, jumps between them."""
         from scipy import sparse
 
         def boolean(rows: IntArray, columns: IntArray, shape: tuple[int, int]) -> Sparse:

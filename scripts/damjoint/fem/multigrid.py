@@ -41,9 +41,7 @@ POWER_ITERATIONS, RAISED = 12, 1.1
 
 @dataclass(frozen=True)
 class Level:
-    """A level of n unknowns and the interpolation from the next one, of m unknowns; in single
-    precision, as it preconditions only.
-    """
+    """A level of n unknowns, the interpolation from m of the next one; in single precision."""
 
     #: K (n, n), and the inverse of the blocks of its diagonal
     stiffness: Sparse
@@ -241,9 +239,7 @@ def tentative_prolongation(part: IntArray, rigid: Array) -> tuple[Sparse, Array,
 
 
 def block_inverse(matrix: Sparse, node: IntArray) -> Sparse:
-    """The inverse of the blocks of a matrix (n, n) that couple unknowns of the same node; unknowns
-    without stiffness stay without.
-    """
+    """The inverse of a matrix's blocks (n, n) of a node; unknowns without stiffness stay so."""
     size, entries = len(node), matrix.tocoo()
     inside = node[entries.row] == node[entries.col]
     row, column, value = (part[inside] for part in (entries.row, entries.col, entries.data))

@@ -132,9 +132,7 @@ OVER_LEVELS: tuple[tuple[str, str, Units, Color], ...] = (
 
 
 def column_of_levels(scene: SolvedScene, column: str) -> np.ndarray:
-    """A column of the history as it is drawn: the opening of the heel under displacement control,
-    else no opening below 0, as in a closed joint.
-    """
+    """A column of the history as drawn: heel's opening if it is controlled, else none below 0."""
     if column != "max_opening":
         return scene.joint_result.history[column]
     driven = scene.result.case["drive"] != "level"

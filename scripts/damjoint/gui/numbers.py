@@ -66,9 +66,7 @@ BESIDE = " | "
 
 @dataclass(frozen=True)
 class Numbers:
-    """Numbers at a step by column, in SI units: of the finite elements and, of a section by
-    parameters, of the gravity method.
-    """
+    """Numbers at a step in SI units: finite elements; of a section also the gravity method."""
 
     elements: dict[str, float]
     rigid: dict[str, float]

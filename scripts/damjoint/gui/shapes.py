@@ -254,9 +254,7 @@ class Deformed:
         }
 
     def forces(self) -> list[tuple[str, np.ndarray, np.ndarray]]:
-        """Forces and earthquake that act: name, values (steps, 2), arrows (steps, 3, 2, 3), which
-        are points as long as the force is zero.
-        """
+        """Forces that act: name, values (steps, 2), arrows (steps, 3, 2, 3), points where zero."""
         length = ARROW * self.scene.case.size
         return [
             (name, values, arrows(tips, values, length))

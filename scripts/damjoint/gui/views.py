@@ -172,9 +172,7 @@ def show(
 
 
 def caption(scene: SolvedScene, step: int) -> tuple[str, str, str]:
-    """Describe a step in three lines: level; opening, crack, softening; safety factors. Of an
-    earthquake: time; crest and opening; slip.
-    """
+    """Three lines: level, opening and crack, factors; of an earthquake: time, crest, slip."""
     now, time = scene.numbers[step].elements, scene.times[step]
     name = scene.result.case.named((scene.joint,))
     if scene.quake is not None:

@@ -128,9 +128,7 @@ class Case(ParameterValues):
 
     @property
     def not_default(self) -> dict[str, Value]:
-        """The parameters that differ from their default; of those that follow others only what is
-        set, of a case of stored results none.
-        """
+        """Parameters that differ from their default; of automatic ones those that are set."""
         of_source: set[str] = set()
         if self.source is not None:
             of_source = {*self.source.text.defaults, *self.source.overrides}
@@ -160,9 +158,7 @@ class Case(ParameterValues):
 
     @property
     def given(self) -> dict[str, Setting]:
-        """The parameters that a user has set: in a case file of their own, or beside it; not what a
-        case or preset of the package sets.
-        """
+        """The parameters that a user has set, in a case file or beside it; not the package's."""
         if self.source is None:
             return {}
         text, known = self.source.text, declared()
@@ -319,9 +315,7 @@ class Case(ParameterValues):
         return between(self.tail_levels, time)
 
     def before_last_level(self) -> Case | None:
-        """The case without its last level; None if it has only one level or a prescribed
-        displacement.
-        """
+        """The case without its last level; None if it has no other, or prescribes displacements."""
         before = len(self.levels) - 1
         if not before or self["drive"] != "level":
             return None

@@ -11,9 +11,7 @@ CASES = data("cases")
 
 
 def is_name(text: str) -> bool:
-    """Whether a text can be the name of a case, of its files and of its folder: one part of a path,
-    printable, neither . nor ..
-    """
+    """Whether a text can name a case and its files: a printable part of a path, not . or .."""
     single = Path(text).name == text and text.strip(".")
     return bool(single) and text.isprintable() and len(text.encode()) <= LONGEST_NAME
 

@@ -222,9 +222,7 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
 
 
 def record_files(text: str, folder: Path = Path()) -> tuple[Path, ...]:
-    """The file of a record from a text, or two of its horizontal and vertical component, "H+V";
-    folder: of relative paths.
-    """
+    """The file of a record, or those of its components "H+V"; folder: of relative paths."""
     whole = folder / text
     first, plus, second = text.partition("+")
     return (folder / first, folder / second) if plus and not whole.exists() else (whole,)

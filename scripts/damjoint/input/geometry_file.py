@@ -76,9 +76,7 @@ def files_of(path: Path, known: dict[Path, str]) -> dict[Path, str]:
 
 
 def state_of(path: Path) -> tuple[FileStates, set[str]]:
-    """The present state of the files of a user's own geometry, and the words in a .geo file, among
-    them the parameters that it uses.
-    """
+    """State of the files of a user's own geometry; words of a .geo, its parameters among them."""
     texts = files_of(path, {}) if path.suffix == ".geo" else {path: ""}
     files = ((file, file.stat()) for file in texts)
     words = set(re.findall(r"\w+", " ".join(texts.values())))

@@ -25,9 +25,7 @@ class JointGraph:
         return {body for pair in self.joints for body in pair} - reached
 
     def is_internal(self, number: int) -> bool:
-        """Whether this joint lies between bodies that other joints hold, too, such as a contraction
-        joint: its resultant is not limited.
-        """
+        """Whether other joints hold both bodies, as of a contraction joint: it has no limit."""
         return self.joints[number][0] != ROCK and not self.separated((number,))
 
     def separating(self, numbers: Sequence[int]) -> tuple[int, ...]:

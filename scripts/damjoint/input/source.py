@@ -15,9 +15,7 @@ from .parameters import checked, of_one_joint, parameter
 
 @dataclass(frozen=True)
 class Source:
-    """What a case is made from: the statements of a case file, and what differs from them; all but
-    the first two as in `load`.
-    """
+    """What a case is made from: statements of a case file, and what differs, see `load`."""
 
     path: Path
     text: casefile.CaseText

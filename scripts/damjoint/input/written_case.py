@@ -38,9 +38,7 @@ def add_settings(file: CaseText, settings: Settings) -> None:
 
 
 def text_with_loading(file: CaseText, case: Case, names: Sequence[str]) -> str:
-    """The text of a case file with title, loading and geometry of a case; names: of its joints, by
-    which lists of their values become blocks.
-    """
+    """A case file's text with title, loading, geometry; names: of the joints of blocks."""
     file.texts = {"title": case.title}
     if case.record:
         files = filter(None, (case.record, case.record_vertical))

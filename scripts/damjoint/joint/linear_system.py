@@ -261,9 +261,7 @@ def many_systems(assembly: Assembly, stiffness: Array, undamaged: Array) -> Line
 
 
 def solve_whole(whole: Array, right: Array, border: Border | None) -> tuple[Array, float]:
-    """Solve A x = right (j,), by LU, for A in a matrix with room for the border, if there is one;
-    the matrix may be overwritten.
-    """
+    """Solve A x = right (j,), by LU; A has room for a border, and may be overwritten."""
     if border is None:
         return lu_solve(whole, right), 0.0
     matrix = whole[:-1, :-1]

@@ -26,9 +26,7 @@ class MixedVariables:
 
 
 class Mixed(SofteningLaw[MixedVariables]):
-    """sigma_n' = r delta_n, tau = r (K_T/K_N) delta_t, r(kappa) the secant of the softening curve;
-    contact under compression.
-    """
+    """sigma_n' = r delta_n, tau = r (K_T/K_N) delta_t, r(kappa) the curve's secant; contact."""
 
     variable_names = ("kappa",)
     softens = True

@@ -345,9 +345,7 @@ class Mesh:
                 gmsh.model.mesh.reverseElements(surface.element_tags[turned])
 
     def bearer(self, line: str) -> str:
-        """The first body, from the highest, that has all nodes of the crest or of a region of
-        LINES: the line force acts on it.
-        """
+        """The highest body with all nodes of crest or line of LINES: the force acts on it."""
         nodes = self.bodies[line].node_tags
         bearers = (n for n, s in self.solids.items() if np.isin(nodes, s.node_tags).all())
         return next(bearers, self.joints[0].lower)

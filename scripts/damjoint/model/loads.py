@@ -98,9 +98,7 @@ COMPLETE = Loading(0.0, 0.0, (1.0,) * len(STAGED))
 
 
 def line_forces(case: Case, loading: Loading) -> dict[str, tuple[float, float]]:
-    """The line forces of a case at a loading along x and y [N/m], in the order of the section's
-    marks; and the traction on a face [Pa].
-    """
+    """Line forces along x and y [N/m] in the order of the section's marks; traction [Pa]."""
     angle, pull = math.radians(case["anchor_angle"]), case["anchor_force"]
     full = {
         "ice": (case["ice_force"], 0.0),

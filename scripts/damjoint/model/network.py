@@ -192,9 +192,7 @@ class HigherHeel(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class WaterPath:
-    """The path of the water through a joint in 2D, which may go on in other joints; in branches off
-    it the water is at rest.
-    """
+    """The path of the water through a joint in 2D and on in others; in branches it is at rest."""
 
     #: heights of its ends at reservoir and tailwater [m], NOWHERE if it has none; head of water at
     #: rest where both are dry, at most

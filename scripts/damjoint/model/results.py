@@ -318,9 +318,7 @@ class Results:
 
     @property
     def partial_load(self) -> bool:
-        """Whether the last state is before the case's last time, at which all loads act in full;
-        False with a prescribed displacement.
-        """
+        """Whether the last state is before all loads act; False with displacement control."""
         time = self.last.get("time", 0.0)
         return self.case["drive"] == "level" and time < self.case.times[-1] - ROUND_OFF
 
@@ -334,9 +332,7 @@ def rows_of(table: Table, number: int, columns: Collection[str]) -> Table:
 
 
 def rows_at(table: Table, time: float | None = None) -> Table:
-    """The rows of one time (the last one by default), sorted joint by joint, from heel to toe, then
-    by z, y and x.
-    """
+    """The rows of one time (default: the last), by joint, from heel to toe, then by z, y, x."""
     time = table["time"].max() if time is None else time
     rows = np.flatnonzero(np.isclose(table["time"], time))
     scale = np.abs(table["s"]).max() or 1.0

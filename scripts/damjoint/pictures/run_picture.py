@@ -188,9 +188,7 @@ def heading(result: Results) -> str:
 
 
 def facts_of(result: Results) -> list[str]:
-    """Loads at the state that is shown; of a single joint its resultants, SSF and place of N, of
-    several those of the decisive one.
-    """
+    """Loads at the state shown; resultants, SSF and place of N on the decisive joint."""
     if not len(result.joint["time"]):
         return []
     case, time = result.case, shown_time(result)
@@ -418,9 +416,7 @@ class Panel(NamedTuple):
 
 
 def draw_history(figure: AnyFigure, shown: list[Panel], result: Results) -> None:
-    """Draw panels over the level, side by side or in a high figure below each other, and mark the
-    steps at which other loads change.
-    """
+    """Draw panels over the level, below each other if high, and the steps of other loads."""
     high = figure.bbox.width < 2 * figure.bbox.height
     shape = (len(shown), 1) if high else (1, len(shown))
     row = panels(figure, *shape, bottom=0.42, top=0.25, down=0.55).ravel()

@@ -85,9 +85,7 @@ def fluids(case: Case, faces: Faces, loading: Loading, undeformed: Faces) -> dic
 
 
 def forces_on(case: Case, loading: Loading) -> dict[str, Array]:
-    """Line forces (2,) [N/m] at a loading by name, and the coefficients of the earthquake; also
-    those that are zero then.
-    """
+    """Line forces (2,) [N/m] at a loading and the earthquake's coefficients, by name; also 0."""
     forces = {name: np.array(force) for name, force in line_forces(case, loading).items()}
     inertia = np.array([case[name] for name in COEFFICIENTS])
     return forces | ({QUAKE: loading.part("quake") * inertia} if inertia.any() else {})

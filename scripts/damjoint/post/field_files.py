@@ -192,9 +192,7 @@ def principal(stress: np.ndarray) -> np.ndarray:
 
 
 def bulk_cells(bodies: dict[str, Body]) -> tuple[Cells, np.ndarray]:
-    """Collect the cells of bodies with common point numbers, and the region number of each cell
-    (n,).
-    """
+    """Cells of bodies with common point numbers, and the region number of each cell (n,)."""
     cells, regions, first = [], [], 0
     for name, body in bodies.items():
         cells += [(shape, table + first) for shape, table in body.cells]

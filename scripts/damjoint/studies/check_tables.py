@@ -53,9 +53,7 @@ NARROWEST = 8
 
 
 def text_table(checks: list[SafetyCheck], width: int | None = None) -> str:
-    """Format the verdicts, below them a table in suitable units, and the notes; width: of the
-    terminal, None: all columns.
-    """
+    """Format verdicts, table, notes; width: of the terminal, None: all columns."""
     rows = [row for check in checks for row in check.printed_rows]
     is_difference = np.array([row["answer"] == DIFFERENCE for row in rows])
     columns, heads, names = [], [], ["case", "method"]

@@ -196,9 +196,7 @@ def renderer(to: Path) -> Callable[[str], bytes]:
         ) from None
 
     def pdf(page: str) -> bytes:
-        """The page as PDF. Raises RunError if a picture is not drawn whole, which weasyprint, even
-        when it is interrupted, only logs.
-        """
+        """The page as PDF. Raises RunError if a picture, as weasyprint only logs, is not whole."""
         errors = ErrorLog(logging.ERROR)
         weasyprint.LOGGER.addHandler(errors)
         try:

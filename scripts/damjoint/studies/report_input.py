@@ -174,9 +174,7 @@ def visible(case: Case) -> set[str]:
 
 
 def entry(parameter: Parameter, values: Sequence[Value], default: Value) -> Entry:
-    """Format a parameter of a case, with a value for each joint where they differ, and its default
-    where that differs, too.
-    """
+    """Format a parameter, with the value of each joint and its default where these differ."""
     shown = values[:1] if all(same(v, values[0]) for v in values) else values
     compared = values[:1] if parameter.automatic else values
     others = [] if all(same(v, default) for v in compared) else [default]
