@@ -32,6 +32,18 @@ NEAR_LIMIT = {"law": "bond", "dam_height": 46.55, "dam_base": 25.078, "dam_crest
 NEAR_LIMIT |= {"E": 1.7599e10, "nu": 0.2, "K_N": 1.9375e12, "K_T": 1.3155e12, "n_joint": 56}
 NEAR_LIMIT |= {"sigma_max": 393620, "adhesion": 0, "mu": 2.0653, "G_f": 183.29, "G_t": 23797}
 NEAR_LIMIT |= {"h_dam": 8.8075, "h_found": 20.086, "found_side": 51.842, "found_depth": 39.497}
+#: A stiff, brittle base below a soft lift that releases its shear (random dam 82-40, simplified).
+STIFF_BASE = {"dam_height": 148, "n_joint": 10, "dam_base": 127, "dam_crest": 25.1, "E": 1.2e12}
+STIFF_BASE |= {"law": ("bond", "rupture"), "K_N": (2.56e14, 1.66e8), "K_T": (4.3e14, 2.89e7)}
+STIFF_BASE |= {"adhesion": (769e3, 0), "mu": (0.471, 0.714), "sigma_max": (19300, 0)}
+STIFF_BASE |= {"G_f": (4.63, -1), "G_t": (153.8, 2000), "alpha": 1, "pena_rupture": (-1, 0.564)}
+STIFF_BASE |= {"uplift": ("drained", "none"), "drain_x": (13, 10.1), "drain_effectiveness": 0.634}
+STIFF_BASE |= {
+    "drain_level": 41.9,
+    "softening": "exponential",
+    "lift_heights": (79.38,),
+    "nu": 0.34,
+}
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -136,3 +148,27 @@ def test_a_path_whose_water_withdraws_again_at_the_same_place_ends():
     assert len(times) > 1
     assert path.leads_higher
     assert path.water_withdraws
+
+
+@pytest.mark.heavy
+def test_a_step_that_breaks_a_joint_at_once_is_tried_by_shorter_ones(solve):
+    """One step leads to a base that has slipped whole at 154 m, with as much strength left as its
+    shear; shorter ones lead to 190.5 m, and a path, without the lift, to 195.45 m.
+    """
+    found = [solve("dam", "44.4,190.5", "0", steps, **STIFF_BASE)[0] for steps in (1, 4)]
+    for result in found:
+        assert verdict(result) == "stands" and result.last["level"] == 190.5
+        assert result.last["slip_length"] < 0.8 * result.case.joint_length
+        assert not result.info.get("broken_at_once")
+    one, four = (result.last for result in found)
+    assert one["crest_ux"] == pytest.approx(four["crest_ux"], rel=1e-5)
+
+
+def test_strength_that_a_step_has_destroyed_is_no_proof_of_sliding(solve):
+    """Without shorter steps the base breaks at once, and holds no more than its shear."""
+    (result,) = solve("dam", "44.4,190.5", "0", 4, **STIFF_BASE, smallest_step=1)
+    ((begin, end),) = result.info["broken_at_once"]
+    assert begin < result.last["level"] == end < 190.5
+    assert verdict(result) == "not converged"
+    assert "shear strength" not in statement(result)
+    assert any("a joint breaks at once" in hint for hint in hints(result))

@@ -219,6 +219,8 @@ class Info(TypedDict, total=False):
     limit_points: Sequence[tuple[float, float]]
     #: levels of unstable crack growth [m]
     unstable_growth: Sequence[float]
+    #: levels [m] before and after each step in which a joint breaks at once
+    broken_at_once: Sequence[tuple[float, float]]
     #: time [-] of the largest change of the water pressure beyond that of the levels, and this [Pa]
     pressure_moves: tuple[float, float]
     #: how the last solution ended without an equilibrium

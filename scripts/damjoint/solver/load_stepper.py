@@ -24,6 +24,12 @@ from .trace_table import trace_table
 #: Times and relative lengths of steps that differ by less are the same.
 SAME_TIME = 1e-9
 
+#: Mean damage of a joint that a step may add without being tried again by shorter ones [-]: it may
+#: have led to another equilibrium than the nearest one, as where the whole joint slips at once.
+LEAP = 0.2
+#: Mean difference of the damage of a joint up to which two states are the same [-].
+SAME_DAMAGE = 0.02
+
 #: Number of strategies by which a step from the equilibrium path to the prescribed level is tried.
 FROM_PATH = 3
 
@@ -72,6 +78,8 @@ class LoadStepper:
         self.limit_points: tuple[tuple[float, float], ...] = ()
         #: the levels at which a crack grew unstably, to a state that depends on the steps
         self.relaxed_at: tuple[float, ...] = ()
+        #: levels between which a joint has broken at once, and no shorter steps lead there [m]
+        self.leapt: tuple[tuple[float, float], ...] = ()
         #: time of the step in which the pressure of water in time has changed most beyond the
         #: change of the levels, and by how much [Pa]
         self.largest_move = (0.0, 0.0)
@@ -205,6 +213,7 @@ class LoadStepper:
             while the time is before the target:
                 step = direct step to the time (the strategies in turn)
                 if it moves the pressure too far:    halve it, and try again
+                if it breaks much at once:           shorter steps, if they lead to another state
                 if none and the weight is in it:     weigh, and try again if that is not linear
                 if none:                             over the limit point, along the equilibrium
                                                      path or by relaxation
@@ -229,6 +238,9 @@ class LoadStepper:
             if step and not smallest and self.moves_pressure(step):
                 cuts += 1
                 dt = max((time - self.state.time) / 2, case["smallest_step"])
+                continue
+            if step and self.leaps(step) and self.by_shorter_steps(step):
+                yield self.state
                 continue
             if step is None and not weighed:
                 weighed = True
@@ -264,6 +276,45 @@ class LoadStepper:
                 strategies[:1] if quick else strategies, extrapolate=True, persist=smallest
             ),
         )
+
+    def leaps(self, step: StepResult) -> bool:
+        """Whether a step adds a mean damage of more than LEAP to a joint, whose law depends on the
+        path.
+        """
+        if self.drives or not self.model.equilibrium.path_dependent:
+            return False
+        return self.model.damage_between(self.state, step.state) > LEAP
+
+    def by_shorter_steps(self, whole: StepResult) -> bool:
+        """Whether shorter steps lead to another state at the time of a step, none of which leaps;
+        if they do they are taken: the step has passed to another branch. Where they lead nowhere
+        the joint breaks at once, `leapt`.
+        """
+        other, end, smallest = self.fork(self.case), whole.state.time, self.case["smallest_step"]
+        step: StepResult | None = whole
+        dt = end - self.state.time
+        while step is None or other.leaps(step) or step.state.time < end:
+            if step is None or other.leaps(step):
+                if dt < smallest * (1 + SAME_TIME):
+                    self.record_leap(other.state, whole.state)
+                    return False
+                dt *= self.case.shared["cut"][0]
+            else:
+                other.accept(step, cuts=0)
+                dt *= 2
+            time = min(other.state.time + max(dt, smallest), end)
+            dt = time - other.state.time
+            step = other.direct_step(time, dt < smallest * (1 + SAME_TIME))
+        other.accept(step, cuts=0)
+        if self.model.damage_between(other.state, whole.state) <= SAME_DAMAGE:
+            return False
+        self.state, self.history = other.state, other.history
+        self.on_step(end)
+        return True
+
+    def record_leap(self, begin: State, end: State) -> None:
+        """Record that a joint breaks at once from one state to another."""
+        self.leapt += ((float(begin.loading.level), float(end.loading.level)),)
 
     def record_move(self, step: StepResult) -> None:
         """Record the largest change of the pressure in a step beyond that of the levels."""
@@ -301,6 +352,8 @@ class LoadStepper:
             control, fallback = self.control(target), self.model.strategies[-1:]
             step = self.model.advance(self.state, target, control, StepOptions(fallback))
             self.end_of_solution = "" if step else self.model.end_of_solution
+            if step and self.leaps(step):
+                self.record_leap(self.state, step.state)
         self.stopped = step is None
         return step
 
@@ -324,6 +377,8 @@ class LoadStepper:
             step, relaxed = over_unstable_growth(
                 self.model, self.state, time, self.control(time), accept_relaxed
             )
+            if step and self.leaps(step):
+                self.record_leap(self.state, step.state)
             if step and relaxed:
                 self.relaxed_at += (step.state.loading.level,)
         return step
@@ -447,6 +502,7 @@ class LoadStepper:
             "weight_with_water": self.weight_with_water,
             "limit_points": self.limit_points,
             "unstable_growth": self.relaxed_at,
+            "broken_at_once": self.leapt,
             "pressure_moves": self.largest_move if self.largest_move[1] > 0 else (),
             "end_of_solution": self.end_of_solution,
             "converged_by_round_off": self.history.by_round_off,

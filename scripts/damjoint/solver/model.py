@@ -302,6 +302,18 @@ class Model:
         """A step from a state to a time; None if no strategy converges."""
         return self.begin(state, time).solve(control, options or StepOptions())
 
+    def damage_between(self, begin: State, end: State) -> float:
+        """The largest mean difference of the damage of a joint in two states [-]."""
+        laws, interface = self.equilibrium.laws, self.equilibrium.interface
+        jumps = (interface.jumps(interface.at_points, state.jump) for state in (begin, end))
+        before, after = (
+            laws.damage(jump, state.variables)
+            for jump, state in zip(jumps, (begin, end), strict=True)
+        )
+        parts = end.variables.split(interface.weights * np.abs(after - before))
+        lengths = end.variables.split(interface.weights)
+        return max(float(part.sum() / own.sum()) for part, own in zip(parts, lengths, strict=True))
+
     def advance_by_first(self, state: State, time: float, control: Control) -> StepResult | None:
         """A step by the first strategy only, from the extrapolation of the last two states."""
         first = self.strategies[:1]

@@ -97,6 +97,11 @@ def hints_on_run(results: Results) -> list[str]:
             f"unstable crack growth at level {min(levels):.4g} m: the state after it depends on "
             "steps and mesh"
         )
+    for begin, end in results.info.get("broken_at_once", ()):
+        messages.append(
+            f"from level {begin:.5g} to {end:.5g} m a joint breaks at once, and no shorter steps "
+            "lead there: what is left of its strength may depend on the steps"
+        )
     for limit, lowest in results.info.get("limit_points", ()):
         messages.append(
             f"unstable crack growth at level {limit:.4g} m: along the equilibrium path the level "

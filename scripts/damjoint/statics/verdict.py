@@ -170,10 +170,11 @@ def why_stopped(results: Results) -> Failure:
 def shear_resistance(results: Results, normal: float) -> float:
     """Shear force [N/m] that the joint, the only one of these results, transmits at the last saved
     state under an effective normal force: mu N and, point by point, what the law has more than mu
-    times the pressure. Tension presses on the other points. Infinite if its law has no bound.
+    times the pressure. Tension presses on the other points. Where a joint has broken at once it is
+    the strength before, of the undamaged joint. Infinite if its law has no bound.
     """
     law, length = results.case.law, results.case.joint_along
-    if not len(results.joint["time"]):
+    if not len(results.joint["time"]) or results.info.get("broken_at_once"):
         return law.shear_resistance(normal, length, 0.0, 0.0)
     rows = results.at()
     stress = rows["sigma_n_eff"]
