@@ -683,6 +683,9 @@ def test_the_first_unstable_growth_of_a_law_without_friction_is_the_critical_lev
     assert f"first unstable crack growth: {answer.growth:.6g}" in lines
     highest = max(answer.after.values())
     assert f"after unstable growth equilibria up to: {highest:.6g}" in lines
+    row = Search(load("k"), "level").find()  # of a sweep, which does not show them
+    assert (row.value, row.mode, row.why) == (answer.value, answer.mode, answer.why)
+    assert answer.value < min(row.after.values()) <= highest
 
 
 @pytest.mark.parametrize("engine", ["condensed", pytest.param("getdp", marks=pytest.mark.heavy)])

@@ -123,6 +123,8 @@ class Search:
         self.factor = ROUGH
         #: relative rise of the level that an increment of them aims at
         self.rise = RISE
+        #: whether the highest levels after unstable growth are found, not only that there are any
+        self.levels_after = False
         #: values on both sides of the gravity method's critical value
         self.guesses: list[float] = []
         self.gravity = GravityValues(case, of, self.case_at, self.joints_at)
@@ -248,13 +250,16 @@ class Search:
         """
         try:
             with limited_threads(1):
+                self.levels_after = True
                 result = self.find()
                 return self.gravity.beside(result, self.trials[-1].path.points)
         except BaseException as error:
             return self.ended_early(error)
 
     def find(self) -> CriticalValue:
-        """Search, without the values of the gravity method."""
+        """Search, without the values of the gravity method and, after unstable growth, the highest
+        level: it is followed only until it shows that there are equilibria at higher ones.
+        """
         return self.level() if self.of == "level" else self.value()
 
     def level(self) -> CriticalValue:
@@ -376,7 +381,8 @@ class Search:
 
     def after_growth(self, path: FailurePath) -> tuple[dict[str, float], FailurePath]:
         """The highest levels [m] that are reached after the unstable crack growth that ends a path,
-        by how it is passed over; and the path, continued if there is no growth.
+        by how it is passed over, or one above the path's, see `find`; and the path, continued if
+        there is no growth.
         """
         after, ended, farther = dict[str, float](), path.ended, path
         for name, relaxes in AFTER.items():
@@ -388,10 +394,16 @@ class Search:
             if relaxes:
                 del other.points[path.top + 1 :]
                 other.pass_over(other.points[-1])
-            other.follow(SURE)
-            other.refine()
-            if other.highest > (1 + PRECISION) * path.highest:
+            higher = (1 + PRECISION) * path.highest
+            # where water enters a crack, it may withdraw later, and the levels not count
+            enough = np.inf if self.levels_after or path.entering else higher
+            other.follow(SURE, enough)
+            if not other.highest > enough:
+                other.refine()
+            if other.highest > higher:
                 after[name] = float(other.highest)
+                if enough < np.inf:
+                    break
             elif not ended:
                 farther = other
         return after, path if after else farther

@@ -270,12 +270,12 @@ class FailurePath(EquilibriumPath):
     # -- its continuation
     # ----------------------------------------------------------------------------------------------
 
-    def follow(self, factor: float) -> None:
+    def follow(self, factor: float, enough: float = np.inf) -> None:
         """Continue until the target is reached, the dam slides or is crushed, the level has settled
         or no further equilibrium is found. A highest level that is not far below the target is
-        refined.
+        refined. enough: level above which it is not followed any farther [m].
         """
-        while not (self.ended or self.decided(factor)):
+        while not (self.ended or self.decided(factor) or self.highest > enough):
             self.advance()
             if self.water_withdraws and not self.to_growth:
                 self.fill_on()
