@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from damjoint.engines.getdp import law
 from damjoint.input.resolve import load
+from damjoint.laws.mixed import MixedVariables
 from numpy.testing import assert_allclose
 
 #: As published: critical stress [Pa], energy [N/m], regularisation [-]
@@ -87,3 +88,27 @@ def by_getdp(jumps):
     """Tractions (n, 3) of the GetDP law without strength."""
     values = law.evaluate("mixed", jumps, settings=CZM | {"sigma_max": 0.0})
     return np.column_stack([values[n] for n in ("sigma_n", "tau_1", "tau_2")])
+
+
+@pytest.mark.parametrize("softening", ["linear", "exponential"])
+@pytest.mark.parametrize("ratio", [0.3, 4.0])
+def test_the_tangent_where_shear_is_not_as_stiff_as_tension(softening, ratio):
+    """K_T = ratio K_N, central differences: tension or contact with shear, in both directions, that
+    softens, unloads or is broken.
+    """
+    settings = CZM | {"K_T": ratio * K_N, "softening": softening, "pena_contact": 0.5}
+    model = load("dam", settings).law
+    length, rng = LENGTH, np.random.default_rng(40)
+    jumps = length * rng.normal(size=(2000, 3)) * [1, ratio**-0.5, ratio**-0.5]
+    kappa = np.maximum(length * rng.uniform(0, 2, 2000), model.delta_e)
+    variables, step = MixedVariables(kappa), 1e-6 * length
+    _, tangent = model.traction_and_tangent(jumps, variables)
+    kink = np.abs(model.equivalent(jumps) - kappa) < 3 * step
+    kink |= np.abs(model.equivalent(jumps) - model.L_C) < 3 * step
+    kink |= np.abs(jumps[:, 0]) < 3 * step
+    assert kink.mean() < 0.01
+    for component, shift in enumerate(step * np.eye(3)):
+        ends = [model.traction_and_tangent(jumps + s, variables)[0] for s in (shift, -shift)]
+        slope = (ends[0] - ends[1]) / (2 * step)
+        within = 2 * model.artificial * max(1, ratio) * K_N  # [Pa/m]
+        assert_allclose(tangent[~kink, :, component], slope[~kink], rtol=1e-6, atol=within)
