@@ -7,7 +7,7 @@ from dataclasses import replace
 import damjoint as dj
 import numpy as np
 import pytest
-from damjoint.studies.calibrate import CONFIDENCE, free_of, inverse
+from damjoint.studies.calibrate import CONFIDENCE, Fit, free_of, inverse
 from damjoint.studies.measurements import Measurements, Series, read
 from numpy.testing import assert_allclose
 
@@ -83,6 +83,22 @@ def test_a_linear_parameter_has_the_estimate_of_linear_regression(tmp_path):
     )
     assert answer.findings == [] and answer.undetermined == []
     assert answer.squares == pytest.approx(np.sum((wanted - e * slope) ** 2), rel=1e-6)
+
+
+def test_derivatives_are_those_of_differences_without_their_runs():
+    """Crest and piezometer with modulus, temperature and drains, direct; with the width of the
+    base by differences; of a prior in closed form.
+    """
+    dam = dj.case("dam", **{**DRAINED, **SEASON})
+    readings = measured(dam, instruments(5, crest_ux=1e-4, head_10=0.5))
+    free = ["E_found", "temperature_dam=-20:20", "drain_effectiveness=lognorm(0.3,0,0.4)"]
+    fit = Fit(dam, free_of(dam, [*free, "dam_base"]), readings, jobs=1)
+    x = np.zeros(4)
+    fit.residuals(x)
+    slopes = fit.derivatives(x)
+    assert fit.runs == 2 and np.isnan(fit.exact(x)[:, 3]).all()
+    assert_allclose(slopes[:, :3], fit.by_differences(x, range(3), True), rtol=1e-4, atol=1e-4)
+    assert slopes[-1].tolist() == [0.0, 0.0, pytest.approx(1 / 0.3), 0.0]
 
 
 @pytest.mark.heavy

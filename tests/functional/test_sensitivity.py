@@ -11,6 +11,7 @@ from damjoint.solver.derivatives import Side
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.studies import sensitivity
 from damjoint.studies.critical import Search
+from scipy.optimize import brentq
 
 SLIDES = {"law": "friction", "adhesion": 0.0, "pena_tang": 0.0, "n_joint": 40, "order": 1}
 
@@ -155,6 +156,45 @@ def test_a_load_that_is_zero_has_a_derivative_on_its_side():
     crest = [run.history["crest_ux"][-1] for run in runs]
     by_difference = (crest[1] - crest[0]) / 1e4
     assert rows["ice_force"].derivatives["crest_ux"] == pytest.approx(by_difference, rel=0.02)
+
+
+@pytest.mark.parametrize("law", ["bond", "endo"])
+def test_a_level_that_is_reached_again_has_the_derivatives_of_the_first_time(law):
+    """Its damage is then about to grow, but both sides have the same derivative: no kink. The
+    corrections by one tangent grew without end, to -5e13 m for -1e-6 m.
+    """
+    weak = {"mu": 1.2, "adhesion": 4e4, "sigma_max": 3e4, "dam_base": 26, "n_joint": 12, "order": 1}
+    case = dj.case("dam", levels=[40, 20, 40, 20, 40], steps=1, law=law, **weak)
+    rows = sensitivity.of_run(case, ["rho_dam"])
+    first, _, second, _, third = (row.derivatives["crest_ux"] for row in rows)
+    assert second == pytest.approx(first, rel=1e-5) and third == pytest.approx(first, rel=1e-5)
+    assert not any(row.kink for row in rows)
+
+
+def test_a_kink_is_said_and_its_derivative_is_that_for_a_larger_value():
+    """At the level at which the first point of a joint without tension opens, a larger density of
+    the water opens it, a smaller one does not.
+    """
+    coarse = {"n_joint": 4, "order": 1, "law": "friction", "adhesion": 0.0, "tolerance": 1e-13}
+
+    def run(level, rho_water=1000.0):
+        stepper = LoadStepper(
+            dj.case("dam", levels=[level], steps=1, rho_water=rho_water, **coarse)
+        )
+        stepper.run()
+        return stepper
+
+    def opening(level):
+        stepper = run(level)
+        interface = stepper.model.equilibrium.interface
+        return interface.jumps(interface.at_points, stepper.state.jump)[:, 0].max()
+
+    level = brentq(opening, 44.0, 48.0, xtol=1e-10, rtol=1e-12)
+    (row,) = sensitivity.of_run(run(level).case, ["rho_water"])
+    crest = [run(level, 1000.0 + step).history.last["crest_ux"] for step in (-0.1, 0.0, 0.1)]
+    below, above = np.diff(crest) / 0.1
+    assert row.kink and abs(above / below - 1) > 1e-4
+    assert row.derivatives["crest_ux"] == pytest.approx(above, abs=0.05 * abs(above - below))
 
 
 def test_the_geometry_by_two_runs():

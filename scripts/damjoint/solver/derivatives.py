@@ -58,8 +58,9 @@ ZERO = {"Pa": 1.0, "Pa per m": 1e5, "N per m": 1e-1, "kg per m3": 1e-2}
 #: Corrections of a derivative, and the last one over the derivative beyond which a point of the
 #: joint is at a kink: about to open, to slip or to break [-].
 CORRECTIONS, KINK = 6, 1e-5
-#: Correction over the derivative up to which there is no further one [-].
-EXACT = 1e-7
+#: Correction over the derivative up to which there is no further one; beyond which the last one
+#: has found no derivative [-].
+EXACT, LOST = 1e-7, 1e-3
 #: Correction times the distance of the sides, over the jumps, up to which it is round-off [-].
 ROUNDING = 1e-13
 
@@ -269,10 +270,10 @@ class Alike:
         both = self.points, self.nodes
         self.begun = tuple(self.law.begin_step(v, begin, end) for v in both)
 
-    def traction(self, jumps: Array, variables: Any) -> Array:
-        """Tractions (n, q, 3) at jumps (n, q, 3) of the Gauss points."""
-        flat = self.law.traction_and_tangent(jumps.reshape(-1, 3), variables)[0]
-        return flat.reshape(jumps.shape)
+    def response(self, jumps: Array, variables: Any) -> tuple[Array, Array]:
+        """Tractions (n, q, 3) and tangents (n, q, 3, 3) at jumps (n, q, 3) of the Gauss points."""
+        traction, tangent = self.law.traction_and_tangent(jumps.reshape(-1, 3), variables)
+        return traction.reshape(jumps.shape), tangent.reshape(*jumps.shape, 3)
 
     def finish(self, at_points: Array, at_nodes: Array) -> None:
         """End the step at jumps (n, q, 3)."""
@@ -304,8 +305,10 @@ class Differentiation:
     once: the laws joint by joint, the bodies, the loads, the water that flows.
     """
 
-    def __init__(self, model: Model, names: Sequence[str]) -> None:
-        """names: of parameters, or of one of a joint, "lift 25 m.mu". Raises InputError."""
+    def __init__(self, model: Model, names: Sequence[str], one_sided: bool = False) -> None:
+        """names: of parameters, or of one of a joint, "lift 25 m.mu"; one_sided: whether the low
+        sides have the values themselves. Raises InputError.
+        """
         self.model, self.names, self.key = model, list(names), key_of(model.case)
         #: whether the equation of each side is evaluated apart, as its water follows from states
         #: before, or not linearly from the jumps
@@ -320,22 +323,25 @@ class Differentiation:
         ]
         #: on each side, the low ones before the high ones: model, and the parameter beyond its
         #: value; of each parameter the distance of its sides
-        self.models, half = list[Model](), list[float]()
+        self.models, beyond = list[Model](), list[float]()
         ends = [half_difference(model.case, name) for name in names]
+        if one_sided:
+            ends = [(v, v, high) if high > v else (v, low, v) for v, low, high in ends]
         self.alone = self.without_followers(
             {n: low for n, (_, low, _) in zip(names, ends, strict=True)}
         )
         for side in (1, 2):
             for name, end in zip(names, ends, strict=True):
                 self.models.append(self.model_with(name, end[side]))
-                half.append((2 * side - 3) * (end[2] - end[1]) / 2)
-        self.half = np.array(half)
+                beyond.append(end[side] - end[0])
+        self.beyond = np.array(beyond)
         self.number, self.distance = len(ends), np.array([high - low for _, low, high in ends])
         start = model.start()
         #: of the sides, if each is evaluated apart; displacement of the crest from which it counts
         self.states = [start] * (2 * self.number)
         self.crest_at_rest = np.zeros(2 * self.number)
-        self.kink = np.zeros(self.number, bool)
+        #: of the parameters: whether at a kink, and whether their rates were not found
+        self.kink, self.lost = np.zeros((2, self.number), bool)
         self.joints = [self.alike_at(k) for k in range(len(model.equilibrium.laws.laws))]
 
     @property
@@ -454,13 +460,15 @@ class Differentiation:
                 self.crest_at_rest = step.displacement("crest")
             if number in wanted or number == len(updates) - 1:
                 rates = {n: self.rate_of(v) for n, v in values(step).items()}
-                results.append(Rates(step.level_rate.copy(), rates, self.kink.copy()))
+                level = np.where(self.lost, np.nan, step.level_rate)
+                results.append(Rates(level, rates, self.kink.copy()))
         return results, self.level_rise(updates, step.linear) if updates else math.inf
 
     def rate_of(self, values: Array) -> Array:
         """The derivatives (parameters,) of values (sides,)."""
         with np.errstate(invalid="ignore"):  # of an infinite safety factor
-            return np.asarray((values[self.number :] - values[: self.number]) / self.distance)
+            rates = (values[self.number :] - values[: self.number]) / self.distance
+        return np.where(self.lost, np.nan, rates)
 
     def level_rise(self, updates: Sequence[Trace], linear: Linearised) -> float:
         """How much the level still rises with the displacement prescribed at the end of a path,
@@ -496,6 +504,8 @@ class SidesInStep:
         #: of the parameters: rates of the jump and of what is unknown beside it
         self.rate = np.zeros((sides.number, len(self.end.jump)))
         self.level_rate = np.zeros(sides.number)
+        #: of the sides: tangents of the laws where they have last been evaluated
+        self.tangents = np.zeros((len(sides.beyond), *self.linear.tangent.law.shape))
         #: of the sides: their steps, if each is evaluated apart
         self.begun = list[Begun]()
         if sides.apart:
@@ -509,10 +519,10 @@ class SidesInStep:
 
     def move(self) -> None:
         """Move the sides by the rates."""
-        half = self.sides.half
+        beyond = self.sides.beyond
         #: the jumps (sides, j); what is unknown beside them (sides,), less that of the end
-        self.jumps = self.end.jump + half[:, None] * np.tile(self.rate, (2, 1))
-        self.shifts = half * np.tile(self.level_rate, 2)
+        self.jumps = self.end.jump + beyond[:, None] * np.tile(self.rate, (2, 1))
+        self.shifts = beyond * np.tile(self.level_rate, 2)
 
     @cached_property
     def loadings(self) -> list[Loading]:
@@ -530,21 +540,24 @@ class SidesInStep:
     def at(self, matrix: CsrMatrix) -> Array:
         """The jumps (sides, q, 3) at points, by `at_points` or `at_nodes` of the interface."""
         dim = self.sides.model.equilibrium.interface.dim
-        jumps = np.zeros((len(self.sides.half), matrix.shape[0] // dim, 3))
+        jumps = np.zeros((len(self.sides.beyond), matrix.shape[0] // dim, 3))
         jumps[:, :, :dim] = matrix.on_rows(self.jumps).reshape(len(jumps), -1, dim)
         return jumps
 
     def tractions(self, some: Sequence[int]) -> Array:
-        """The tractions (sides, q, 3) of the laws at the Gauss points, of some sides."""
+        """The tractions (sides, q, 3) of the laws at the Gauss points, of some sides; their
+        tangents are kept.
+        """
         jumps, chosen = self.at(self.sides.model.equilibrium.interface.at_points), set(some)
         traction = np.zeros_like(jumps)
         for part, joint in self.sides.of_joints(self.problem.variables.starts):
             for alike in joint:
                 if chosen.isdisjoint(alike.sides.tolist()):
                     continue
-                traction[alike.sides, part] = alike.traction(
-                    jumps[alike.sides, part], alike.begun[0]
-                )
+                (
+                    traction[alike.sides, part],
+                    self.tangents[alike.sides, part],
+                ) = alike.response(jumps[alike.sides, part], alike.begun[0])
         return traction
 
     def residuals(self, some: Sequence[int]) -> Array:
@@ -553,8 +566,8 @@ class SidesInStep:
         values = np.zeros_like(jumps)
         if sides.apart:
             for k in some:
-                at = jumps[k], self.loading(k)
-                values[k] = self.begun[k].problem.residual(*at).value
+                residual = self.begun[k].problem.residual(jumps[k], self.loading(k))
+                values[k], self.tangents[k] = residual.value, residual.by_jump(False).law
             return values
         values = (problem.stiffness @ jumps.T).T
         base = sides.model.equilibrium
@@ -630,24 +643,49 @@ class SidesInStep:
     # -- their derivatives
 
     def solve(self) -> None:
-        """Solve for the rates; where they need more than a correction, the parameter has a kink."""
-        number = self.sides.number
+        """Solve for the rates: first with the tangent of the end; where they need more than a
+        correction, the parameter has a kink, or is so near to one that the sides are beyond it.
+        Their corrections are those of the tangents of both sides.
+        """
+        sides, size = self.sides, np.linalg.norm(self.end.jump)
+        number, distance = sides.number, sides.distance
         some = np.arange(number)
         for correction in range(CORRECTIONS if number else 0):
             values = self.residuals([*some.tolist(), *(some + number).tolist()])
-            rights = ((values[:number] - values[number:]).T / self.sides.distance)[:, some]
-            change, level_change = self.linear.solve(rights, self.gaps()[some])
+            rights = ((values[:number] - values[number:]).T / distance)[:, some]
+            if correction < 2:
+                change, level_change = self.linear.solve(rights, self.gaps()[some])
+            else:
+                change, level_change = self.by_own_tangents(some, rights)
             self.rate[some] += change.T
             self.level_rate[some] += level_change
             self.move()
             if not correction:
                 continue
-            error, size = (np.linalg.norm(v, axis=-1) for v in (change.T, self.rate[some]))
-            seen = error * self.sides.distance[some] > ROUNDING * np.linalg.norm(self.end.jump)
-            self.sides.kink[some] |= seen & (error > KINK * size)
-            some = some[seen & (error > EXACT * size)]
+            error, rate = (np.linalg.norm(v, axis=-1) for v in (change.T, self.rate[some]))
+            seen = error * distance[some] > ROUNDING * size
+            sides.kink[some] |= seen & (error > KINK * rate)
+            lost = some[seen & (error > LOST * rate)]
+            some = some[seen & (error > EXACT * rate)]
             if not len(some):
-                break
+                return
+        if number:
+            sides.lost[lost] = True
+
+    def by_own_tangents(self, some: IntArray, rights: Array) -> tuple[Array, Array]:
+        """The corrections of some rates, each with the tangents of its sides: their mean, weighted
+        by how far the sides are from the state.
+        """
+        gaps, number, tangent = self.gaps(), self.sides.number, self.linear.tangent
+        columns = []
+        for k, right in zip(some.tolist(), rights.T, strict=True):
+            pair = [k, k + number]
+            weights = np.abs(self.sides.beyond[pair]) / np.abs(self.sides.beyond[pair]).sum()
+            of = replace(tangent, law=np.tensordot(weights, self.tangents[pair], 1))
+            linear = replace(self.linear, tangent=of)
+            columns.append(linear.solve(right[:, None], gaps[[k]]))
+        changes, level_changes = zip(*columns, strict=True)
+        return np.hstack(changes), np.concatenate(level_changes)
 
     def gaps(self) -> Array:
         """What is missing of the rates (parameters,) of a prescribed displacement; 0 without."""
@@ -676,7 +714,7 @@ class SidesInStep:
             for alike in joint:
                 alike.finish(at_points[alike.sides, of_points], at_nodes[alike.sides, of_nodes])
         if sides.apart:
-            sides.states = [self.state(k) for k in range(len(sides.half))]
+            sides.states = [self.state(k) for k in range(len(sides.beyond))]
 
     @property
     def joints(self) -> list[tuple[tuple[slice, list[Alike]], tuple[slice, list[Alike]]]]:
@@ -721,7 +759,7 @@ class SidesInStep:
             return [state.pressures[joint] for state in sides.states]
         assert self.problem.water
         water, variables, result = base.water[joint], self.problem.water.variables, []
-        nodal: Sequence[Array | None] = [None] * len(sides.half)
+        nodal: Sequence[Array | None] = [None] * len(sides.beyond)
         if water.system in base.flowing and not self.control:
             nodal = list(self.nodal[base.flowing.index(water.system)][:, water.nodes])
         for side, (model, jump) in enumerate(zip(sides.models, self.jumps, strict=True)):
@@ -737,7 +775,7 @@ class SidesInStep:
         """Time and level, the columns of history.csv that follow the parameters continuously, and
         of each joint `crack_end`.
         """
-        interface, number = self.sides.model.equilibrium.interface, len(self.sides.half)
+        interface, number = self.sides.model.equilibrium.interface, len(self.sides.beyond)
         at_points, at_nodes = (self.at(m) for m in (interface.at_points, interface.at_nodes))
         row = {
             "time": np.full(number, self.end.time),
@@ -760,7 +798,7 @@ class SidesInStep:
         for alike in sides:
             law, flat = alike.law, jumps[alike.sides].reshape(-1, 3)
             shape = len(alike.sides), len(weights)
-            traction[alike.sides] = alike.traction(jumps[alike.sides], alike.points)
+            traction[alike.sides] = alike.response(jumps[alike.sides], alike.points)[0]
             bonded[alike.sides] = law.cohesion_left(flat, alike.points).reshape(shape)
             of_crack = law.opening_of_crack(alike.points, len(flat))
             opening[alike.sides] = of_crack.reshape(shape)

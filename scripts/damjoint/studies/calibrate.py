@@ -25,6 +25,7 @@ from ..input.arithmetic import explained, quantity
 from ..input.case import Case
 from ..input.resolve import varied
 from ..processes import as_finished, number_of
+from ..solver.derivatives import half_difference
 from ..solver.load_stepper import LoadStepper
 from ..threads import limited_threads
 from . import sampling
@@ -34,8 +35,9 @@ from .measurements import Measurements, Series
 CONFIDENCE = 0.95
 #: Step of the differences in a scaled parameter: its logarithm, or its value over its scale.
 STEP = 1e-3
-#: Relative change of the sum of squares at which the search ends.
-SAME_SQUARES = 1e-8
+#: Relative change of the sum of squares at which the search ends: of a hundred values that fit,
+#: 1e-3 of chi2, 0.03 standard deviations of an estimate. Below, kinks of the points decide.
+SAME_SQUARES = 1e-5
 #: Change of the scaled parameters, over themselves, at which it ends.
 SAME_PARAMETERS = 1e-6
 #: Derivative of half the sum of squares by a scaled parameter at which it ends.
@@ -86,12 +88,22 @@ class Free:
             return math.log(value / self.start) if value > 0 else -math.inf
         return (value - self.start) / self.scale
 
+    def slope(self, x: float) -> float:
+        """The derivative of the value with the scaled one."""
+        return self.value(x) if self.positive else self.scale
+
     def residual(self, x: float) -> float:
         """The weighted residual of the prior."""
         assert self.prior
         mean, deviation, logarithm = self.prior
         value = self.value(x)
         return ((math.log(value) if logarithm else value) - mean) / deviation
+
+    def residual_slope(self, x: float) -> float:
+        """The derivative of that residual."""
+        assert self.prior
+        _, deviation, logarithm = self.prior
+        return self.slope(x) / deviation / (self.value(x) if logarithm else 1.0)
 
 
 def free_of(case: Case, texts: Sequence[str]) -> list[Free]:
@@ -312,6 +324,15 @@ class Calibration:
 Computed = Array | None
 
 
+def has_derivative(case: Case, name: str) -> bool:
+    """Whether a parameter has derivatives by direct differentiation."""
+    try:
+        half_difference(case, name)
+    except InputError:
+        return False
+    return True
+
+
 def trial(measurements: Measurements, case: Case) -> Computed:
     """What a case computes in place of the measurements; None without an equilibrium."""
     with limited_threads(1):
@@ -375,13 +396,40 @@ class Fit:
         return weighted
 
     def derivatives(self, x: Array, central: bool = False) -> Array:
-        """The derivatives of the weighted residuals (residuals, parameters) by differences, one
-        step away from a limit.
+        """The derivatives of the weighted residuals (residuals, parameters): by direct
+        differentiation of the run, by differences with parameters with which a computed value has
+        no exact one.
 
-        Raises RunError if the dam has no equilibrium there.
+        Raises RunError if the dam has no equilibrium beside a difference.
         """
+        slopes = self.exact(x)
+        others = np.flatnonzero(np.isnan(slopes).any(axis=0)).tolist()
+        slopes[:, others] = self.by_differences(x, others, central)
+        return slopes
+
+    def exact(self, x: Array) -> Array:
+        """Those by direct differentiation; nan where there is none."""
+        slopes = np.full((len(self.weighted(x, self.computed(x))), len(self.free)), np.nan)
+        priors = np.diag([f.residual_slope(v) if f.prior else 0.0 for f, v in self.at_each(x)])
+        some = [k for k, one in enumerate(self.free) if has_derivative(self.case, one.name)]
+        with limited_threads(1), contextlib.suppress(InputError, RunError, np.linalg.LinAlgError):
+            assert self.stepper
+            rates = self.measurements.rates_of_run(self.stepper, [self.free[k].name for k in some])
+            scales = np.array([one.slope(v) for one, v in self.at_each(x)])[some]
+            weighted = (rates / self.deviation[:, :, None])[self.read] * scales
+            of_priors = priors[[f.prior is not None for f in self.free]]
+            slopes[:, some] = np.vstack([weighted, of_priors[:, some]])
+        return slopes
+
+    def at_each(self, x: Array) -> list[tuple[Free, float]]:
+        """The free parameters and their scaled values."""
+        return list(zip(self.free, x.tolist(), strict=True))
+
+    def by_differences(self, x: Array, numbers: Sequence[int], central: bool) -> Array:
+        """Those with parameters of some numbers, one step away from a limit."""
         steps = []
-        for k, one in enumerate(self.free):
+        for k in numbers:
+            one = self.free[k]
             step = STEP if x[k] + STEP <= one.scaled(one.high) else -STEP
             for factor in (1, -1) if central else (1,):
                 shifted = x.copy()
@@ -391,18 +439,18 @@ class Fit:
                 steps.append((k, shifted))
         found = self.computed_at([shifted for _, shifted in steps])
         start = self.weighted(x, self.computed(x))
-        slopes = np.zeros((len(start), len(self.free)))
-        ends: dict[int, list[tuple[float, Array]]] = {k: [] for k in range(len(self.free))}
+        slopes = np.zeros((len(start), len(numbers)))
+        ends: dict[int, list[tuple[float, Array]]] = {k: [] for k in numbers}
         for number, (k, shifted) in enumerate(steps):
             if found[number] is not None:
                 ends[k].append((shifted[k], self.weighted(shifted, found[number])))
-        for k, reached in ends.items():
+        for column, (k, reached) in enumerate(ends.items()):
             pairs = [*reached, (x[k], start)] if len(reached) < 2 else reached
             (x1, r1), (x0, r0) = pairs[0], pairs[-1]
             if x1 == x0:
                 name = self.free[k].name
                 raise RunError(f"{name}: the dam has no equilibrium beside {self.at(x)[name]:g}")
-            slopes[:, k] = (r1 - r0) / (x1 - x0)
+            slopes[:, column] = (r1 - r0) / (x1 - x0)
         return slopes
 
     def computed_at(self, points: Sequence[Array]) -> list[Computed]:

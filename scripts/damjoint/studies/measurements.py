@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from ..input.case import Case
 from ..input.resolve import varied
 from ..joint.interface import interface_of
 from ..model.results import Results, history_columns
+from ..solver.derivatives import Differentiation, SidesInStep
 from ..solver.load_stepper import LoadStepper
 
 #: Columns of the file besides those that are measured: of the reservoir and the tailwater [m above
@@ -59,6 +60,22 @@ class Series:
         ]
         return np.array(interpolated)
 
+    def of_sides(self, step: SidesInStep, row: Mapping[str, Array]) -> Array:
+        """The same quantity on both sides of parameters at the end of a step (sides,), see
+        `SidesInStep.row`; nan if it does not follow the parameters continuously.
+        """
+        if self.position is None:
+            return row.get(self.name, np.full(len(step.jumps), np.nan))
+        joint = step.sides.model.equilibrium.interface.joints[self.joint]
+        s, y = joint.xi * joint.length, joint.space.locations[:, 1]
+        order, pressures = np.argsort(s), step.pressures(self.joint)
+        cases = [model.case.joints[self.joint] for model in step.sides.models]
+        heads = [
+            p.nodes / (case["rho_water"] * case["g"]) + y
+            for p, case in zip(pressures, cases, strict=True)
+        ]
+        return np.array([np.interp(self.position, s[order], head[order]) for head in heads])
+
 
 @dataclass(frozen=True)
 class Measurements:
@@ -90,9 +107,27 @@ class Measurements:
     @staticmethod
     def run_of(case: Case) -> LoadStepper:
         """The run of a loaded case."""
-        stepper = LoadStepper(case, interface_of(case))
+        stepper = LoadStepper(replace(case, all_steps=True), interface_of(case))
         stepper.run()
         return stepper
+
+    def rates_of_run(self, stepper: LoadStepper, names: Sequence[str]) -> Array:
+        """The derivatives (series, readings, parameters) of what a run has in place of each
+        measurement, with parameters of its case by their names; nan where there is none.
+
+        Raises InputError, and RunError if a state has none.
+        """
+        assert stepper.state.trace
+        updates = stepper.state.trace.updates
+        last = {update.state.time: number for number, update in enumerate(updates)}
+        ends = [last[time] for time in self.times.tolist()]
+
+        def values(step: SidesInStep) -> dict[str, Array]:
+            row = step.row() if any(one.position is None for one in self.series) else {}
+            return {one.name: one.of_sides(step, row) for one in self.series}
+
+        rates, _ = Differentiation(stepper.model, names).along(updates, ends, values)
+        return np.array([[of.values[one.name] for of in rates] for one in self.series])
 
     def of_run(self, stepper: LoadStepper) -> Array:
         """What a run has in place of each measurement (series, readings).

@@ -22,6 +22,7 @@ from ..post.tables import write_csv
 from ..solver.derivatives import (
     NOT_CONTINUOUS,
     Differentiation,
+    Rates,
     Side,
     SidesInStep,
     half_difference,
@@ -56,6 +57,10 @@ PRINTED = (
 
 #: Part of the largest change of a result below which another one is round-off.
 ROUNDING = 1e-9
+
+#: Difference of derivatives to one and to both sides, over them, beyond which there is a kink [-],
+#: and that of results by a relative change of one, over them, up to which it is round-off [-].
+ONE_SIDED, ROUND_OFF = 1e-3, 1e-5
 
 #: Rise of the level with the displacement, over its mean on the path [-], up to which a point
 #: counts as a limit point, whose level has a derivative: 5e-6 where a dam slides; 5e-4 gives 2 % of
@@ -93,9 +98,9 @@ OF_GEOMETRY = 5e-3
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Derivatives with a parameter, per its unit, by column; kink: whether they are one of several,
-    as a point of the joint is about to open, to slip or to break; of_runs: whether they are
-    differences of two runs.
+    """Derivatives with a parameter, per its unit, by column; kink: whether a point of the joint is
+    about to open, to slip or to break, so that they are those for a larger value (a smaller one at
+    the parameter's maximum); of_runs: whether they are differences of two runs.
     """
 
     name: str
@@ -200,17 +205,43 @@ def of_run(case: Case, names: Sequence[str]) -> list[Sensitivity]:
         direct = [name for name in names if name not in others]
         ends = [max(i for i, u in enumerate(updates) if u.state.time == time) for time in saved]
         rates, _ = Differentiation(stepper.model, direct).along(updates, ends, values_of_sides)
-        rows = []
+        # near a kink: also those for a larger value, which are others at a kink
+        near = [name for name, kink in zip(direct, rates[-1].kink, strict=True) if kink]
+        larger, _ = Differentiation(stepper.model, near, one_sided=True).along(
+            updates if near else [], ends, values_of_sides
+        )
+        rows, sizes = [], {}
+        if near:
+            sizes = values_of(Side(stepper.model, stepper.state, stepper.history.at_rest))
         for k, name in enumerate(direct):
             value, *_ = half_difference(stepper.case, name)
-            for last, of in zip(ends, rates, strict=False):
+            for number, (last, of) in enumerate(zip(ends, rates, strict=False)):
                 level = updates[last].state.loading.level
-                row = {c: float(of.values[c][k]) for c in columns if c in of.values}
-                given = {c: v for c, v in row.items() if np.isfinite(v)}
-                rows.append(Sensitivity(name, value, float(level), given, bool(of.kink[k])))
+                row, kink = row_at(of, k, columns), False
+                if of.kink[k]:
+                    other = row_at(larger[number], near.index(name), columns)
+                    noise = {c: ROUND_OFF * abs(sizes[c] / (value or 1)) for c in columns}
+                    kink = differ(row, other, noise)
+                    row = other if kink else row
+                rows.append(Sensitivity(name, value, float(level), row, kink))
         for name in others:
             rows += of_two_runs(stepper, name, columns)
     return rows
+
+
+def row_at(rates: Rates, parameter: int, columns: Iterable[str]) -> dict[str, float]:
+    """The derivatives with a parameter, by its number, of columns that have one."""
+    row = {c: float(rates.values[c][parameter]) for c in columns if c in rates.values}
+    return {column: value for column, value in row.items() if np.isfinite(value)}
+
+
+def differ(
+    row: Mapping[str, float], other: Mapping[str, float], noise: Mapping[str, float]
+) -> bool:
+    """Whether derivatives differ by more than what a difference to one side costs, and noise."""
+    return row.keys() != other.keys() or any(
+        abs(row[c] - v) > ONE_SIDED * max(abs(row[c]), abs(v)) + noise[c] for c, v in other.items()
+    )
 
 
 def values_of(side: Side) -> dict[str, float]:
@@ -298,6 +329,11 @@ def of_point(point: Point, names: Sequence[str]) -> list[Sensitivity]:
             )
         for k, name in enumerate(names):
             value, *_ = half_difference(point.model.case, name)
+            if np.isnan(end.level[k]):
+                raise RunError(
+                    f"sensitivity: no derivative with {name} is found; the point of the "
+                    "critical level is at a kink"
+                )
             given = {"critical_level": float(end.level[k])}
             rows.append(Sensitivity(name, value, float(point.level), given, bool(end.kink[k])))
     return rows
