@@ -230,6 +230,9 @@ def test_names_of_cases_and_records_stay_in_their_variations(tmp_path):
     assert len(checks) == 2 and checks[:1] == [checks[0]]
     with pytest.raises(dj.InputError, match="name = 'a/b': must be a text"):
         dj.case(usual, name="a/b")
+    (tmp_path / "wave.csv").write_text("0,0\n0.01,1\n0.02,0\n")
+    with pytest.raises(dj.InputError, match="record_unit = unstated"):  # not of the path's type
+        dj.sweep("dam", quake=0.05, record=[tmp_path / "wave.csv"], jobs=1)
 
 
 def test_history_of_several_joints_for_xarray():

@@ -68,6 +68,11 @@ def test_form_and_sorm_of_a_dam_that_slides(trial):
     assert design["level"] == pytest.approx(level, rel=1e-4)
     assert sum(trial.importance.values()) == pytest.approx(1)
     assert trial.importance["mu"] == pytest.approx(0.707, abs=0.01)
+    levels = trial.to_pandas("levels")  # the rows of reliability.csv
+    assert len(levels) == trial.levels.computed and set(levels["mode"]) == {"sliding"}
+    of = levels[levels.d_mu.notna()].iloc[-1]
+    assert of.critical_level == pytest.approx(slide_level(of.mu, of.rho_dam, 0), rel=1e-5)
+    assert of.d_mu > 0 and levels.d_mu.isna().any()
 
 
 def test_form_and_sorm_need_few_critical_levels():

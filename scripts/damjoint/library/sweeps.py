@@ -151,7 +151,7 @@ def sweep(
     quake: float | Mapping[str, float | Sequence[float]] | None = None,
     jobs: int | None = None,
     progress: bool = False,
-    **values: Sequence[Value] | Value,
+    **values: Sequence[Value | Path] | Value | Path,
 ) -> Sweep:
     """Solve a case with all combinations of listed values, each with the entire sample.
 
@@ -184,7 +184,7 @@ def sweep(
     check_jobs(jobs)
     if not values and not sample:
         raise InputError("sweep: must have values or a sample, such as mu=[0.8, 1.0]")
-    axes = [(name, listed(name, np.atleast_1d(v).tolist())) for name, v in values.items()]
+    axes = [(name, listed(name, np.atleast_1d(np.array(v)).tolist())) for name, v in values.items()]
     plan = plan_with(axes, list((tie or {}).items()), sample, {}, critical)
     plan = replace(plan, quake=limits_of(quake))
     case = on_fixed_mesh(noted(as_case(source)))

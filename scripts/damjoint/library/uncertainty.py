@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import RunError
+from ..arrays import Value
 from ..input.case import Case
 from ..python_words import speaks_python
 from .cases import as_case, noted, on_fixed_mesh
-from .tables import Tables, WithTables, records
+from .tables import Tables, WithTables, by_column, records
 
 if TYPE_CHECKING:
     from ..studies.calibrate import Calibration
@@ -38,6 +39,8 @@ class Reliability(WithTables):
     #: of each of several joints if no other could fail, then that of all
     results: Sequence[OfJoint]
     levels: CriticalLevels
+    #: of each critical level the cells of reliability.csv
+    level_rows: Sequence[Mapping[str, Value]] = ()
 
     @property
     def case(self) -> Case:
@@ -75,12 +78,19 @@ class Reliability(WithTables):
     def by_name(self) -> Tables:
         """The table rows, one per joint if no other could fail, and one of all: joint (empty: all),
         beta, probabilities form, breitung, tvedt (SORM), sampled with the limits low, high of its
-        95 % interval; nan where a method has none.
+        95 % interval; nan where a method has none. The table levels, one row per critical level as
+        in reliability.csv: of_joint, the varied values, critical_level [m], mode, joint, confirmed,
+        confirmed_by, its derivatives d_...; nan where it has none.
         """
         names = "joint", "beta", "form", "breitung", "tvedt", "sampled", "low", "high"
         cells = {n: [getattr(one, n) for one in self.results] for n in names}
         table = {n: np.array([np.nan if v is None else v for v in cells[n]]) for n in names}
-        return {"rows": (table, dict.fromkeys(names[1:], ("-", "")))}
+        texts, units = ("of_joint", "mode", "joint", "confirmed_by"), {"critical_level": ("m", "")}
+        levels = {
+            name: [np.nan if v == "" and name not in texts else v for v in column]
+            for name, column in (by_column(self.level_rows) if self.level_rows else {}).items()
+        }
+        return {"rows": (table, dict.fromkeys(names[1:], ("-", ""))), "levels": (levels, units)}
 
     def __repr__(self) -> str:
         whole = self.results[-1]
@@ -124,12 +134,13 @@ def reliability(
         ([''], ['level', 'mu'])
     """
     from ..processes import check_jobs
-    from ..studies.reliability import CriticalLevels, Variables, analysed
+    from ..studies.reliability import CriticalLevels, Variables, analysed, level_row
 
     check_jobs(jobs)
-    variables = Variables(distributions, correlate, tie or {})
+    variables, rows = Variables(distributions, correlate, tie or {}), list[Mapping[str, Value]]()
     levels = CriticalLevels(on_fixed_mesh(noted(as_case(source))), variables, jobs)
-    return Reliability(list(analysed(levels, samples, seed, lambda message: None)), levels)
+    levels.on_row = lambda _, *row: rows.append(level_row(variables, *row))
+    return Reliability(list(analysed(levels, samples, seed, lambda message: None)), levels, rows)
 
 
 @speaks_python
@@ -181,7 +192,12 @@ def calibrate(
 
 
 @speaks_python
-def sensitivity(source: Case | str | Path, *names: str, critical: bool = False) -> np.recarray:
+def sensitivity(
+    source: Case | str | Path,
+    *names: str,
+    critical: bool = False,
+    vary: Mapping[str, str] | None = None,
+) -> np.recarray:
     """Derivatives with parameters, by direct differentiation of the steps; nothing is written.
 
     A row per parameter and level: parameter, unit, value, level [m], kink (1: they are one-sided),
@@ -193,9 +209,11 @@ def sensitivity(source: Case | str | Path, *names: str, critical: bool = False) 
         names: parameters, or one of a joint, "lift 25 m.mu"; none: all that have an effect, but
             those of the geometry, whose derivatives are differences of two runs (of_runs: 1).
         critical: of the critical level instead of the results of a run.
+        vary: distributions by parameter, as texts, see `reliability`; their standard deviations
+            are the column `deviation` (nan without one).
 
     Raises:
-        InputError: a parameter that has no derivative.
+        InputError: a parameter that has no derivative, or a distribution of another one.
         RunError: a state after unstable crack growth, or no critical level.
 
     Example:
@@ -205,13 +223,19 @@ def sensitivity(source: Case | str | Path, *names: str, critical: bool = False) 
         (['mu'], True)
     """
     from ..studies.critical import Search
-    from ..studies.sensitivity import ALL, names_of, of_point, of_run, table
+    from ..studies.sensitivity import ALL, DEVIATION, deviations_of, names_of, of_point, of_run
+    from ..studies.sensitivity import table as table_of
 
-    chosen = on_fixed_mesh(noted(as_case(source)))
-    listed_names = names_of(chosen, ",".join(names) or ALL, geometry=not critical)
-    if not critical:
-        return records(table(of_run(chosen, listed_names)))
-    answer = Search(replace(chosen, all_steps=True), "level").find()
-    if answer.value is None or answer.point is None:
-        raise RunError(f"no critical level: {answer.doubt}")
-    return records(table(of_point(answer.point, listed_names)))
+    chosen, deviations = on_fixed_mesh(noted(as_case(source))), deviations_of(vary or {})
+    listed_names = names_of(chosen, ",".join(names) or ALL, not critical, deviations)
+    if critical:
+        answer = Search(replace(chosen, all_steps=True), "level").find()
+        if answer.value is None or answer.point is None:
+            raise RunError(f"no critical level: {answer.doubt}")
+        rows = of_point(answer.point, listed_names)
+    else:
+        rows = of_run(chosen, listed_names)
+    table = table_of(rows)
+    if deviations:
+        table[DEVIATION] = [deviations.get(row.name, np.nan) for row in rows]
+    return records(table)

@@ -325,15 +325,20 @@ class Differentiation:
         #: value; of each parameter the distance of its sides
         self.models, beyond = list[Model](), list[float]()
         ends = [half_difference(model.case, name) for name in names]
+        middle = [(low + high) / 2 for _, low, high in ends]
         if one_sided:
-            ends = [(v, v, high) if high > v else (v, low, v) for v, low, high in ends]
+            middle = [
+                value if low <= value else m
+                for m, (value, low, _) in zip(middle, ends, strict=True)
+            ]
+            ends = [(v, max(v, low), high) if high > v else (v, low, v) for v, low, high in ends]
         self.alone = self.without_followers(
             {n: low for n, (_, low, _) in zip(names, ends, strict=True)}
         )
         for side in (1, 2):
             for name, end in zip(names, ends, strict=True):
                 self.models.append(self.model_with(name, end[side]))
-                beyond.append(end[side] - end[0])
+                beyond.append(end[side] - middle[len(beyond) % len(names)])
         self.beyond = np.array(beyond)
         self.number, self.distance = len(ends), np.array([high - low for _, low, high in ends])
         start = model.start()

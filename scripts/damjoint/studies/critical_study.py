@@ -61,7 +61,9 @@ def critical(
         lines = printed_lines(answer, search)
         if sensitivity and answer.point and answer.value is not None:
             what = study.out, answer.point, sensitivity, deviations
-            lines += ["", *derivative_lines(case.name, *what)]
+            with preparation(search.case) as shown:
+                shown.describe(f"{case.name}: {sensitivities.STAGE}")
+                lines += ["", *derivative_lines(case.name, *what)]
     return answer, lines
 
 

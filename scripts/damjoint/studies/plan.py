@@ -141,12 +141,13 @@ def in_file(value: Value) -> str:
     return value if isinstance(value, str) else f"{value:.{DIGITS}g}"
 
 
-def listed(name: str, values: Sequence[Value]) -> list[Value]:
-    """Values of a parameter or of level, checked and rounded as a result file has them.
+def listed(name: str, values: Sequence[Value | Path]) -> list[Value]:
+    """Values of a parameter, of level or of record, checked and rounded as a result file has them.
 
     Raises InputError.
     """
-    return [checked(name, v if isinstance(v, str) else rounded(v)) for v in values]
+    texts = [str(v) if isinstance(v, Path) else v for v in values]
+    return [checked(name, v if isinstance(v, str) else rounded(v)) for v in texts]
 
 
 def values_of(text: str) -> tuple[str, list[Value]]:

@@ -618,11 +618,16 @@ def columns_of(variables: Variables) -> list[str]:
     return ["key", "of_joint", *names, *RESULTS, *rates]
 
 
+def level_row(
+    variables: Variables, joint: str, values: Values, result: Mapping[str, Value]
+) -> dict[str, Value]:
+    """A critical level by the columns of reliability.csv but key; "" where it has no value."""
+    cells = {"of_joint": joint, **values, **result}
+    return {name: cells.get(name, "") for name in columns_of(variables)[1:]}
+
+
 def cells_of(
     variables: Variables, key: str, joint: str, values: Values, result: Mapping[str, Value]
 ) -> list[str]:
     """A row of reliability.csv."""
-    names = [n for n in variables.names if n != "level"]
-    given = [in_file(values[n]) if n in values else "" for n in names]
-    rates = [result.get(rate_column(n), "") for n in (*names, *variables.tied)]
-    return [key, joint, *given, *(in_file(result[n]) for n in RESULTS), *map(in_file, rates)]
+    return [key, *map(in_file, level_row(variables, joint, values, result).values())]

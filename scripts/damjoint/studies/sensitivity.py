@@ -223,7 +223,8 @@ def of_run(case: Case, names: Sequence[str]) -> list[Sensitivity]:
                     noise = {c: ROUND_OFF * abs(sizes[c] / (value or 1)) for c in columns}
                     kink = differ(row, other, noise)
                     row = other if kink else row
-                rows.append(Sensitivity(name, value, float(level), row, kink))
+                if row:
+                    rows.append(Sensitivity(name, value, float(level), row, kink))
         for name in others:
             rows += of_two_runs(stepper, name, columns)
     return rows
@@ -329,13 +330,11 @@ def of_point(point: Point, names: Sequence[str]) -> list[Sensitivity]:
             )
         for k, name in enumerate(names):
             value, *_ = half_difference(point.model.case, name)
-            if np.isnan(end.level[k]):
-                raise RunError(
-                    f"sensitivity: no derivative with {name} is found; the point of the "
-                    "critical level is at a kink"
-                )
             given = {"critical_level": float(end.level[k])}
-            rows.append(Sensitivity(name, value, float(point.level), given, bool(end.kink[k])))
+            if np.isfinite(end.level[k]):
+                rows.append(Sensitivity(name, value, float(point.level), given, bool(end.kink[k])))
+    if not rows:
+        raise RunError(f"sensitivity: no derivative with {', '.join(names)} is found, at a kink")
     return rows
 
 
