@@ -24,18 +24,8 @@ def test_sliding(solve, uplift, levels, hardening):
 
 
 def test_a_run_that_stops_exits_with_1_and_prints_the_level(command):
-    code, out, err = command(
-        "run",
-        "c",
-        "--set",
-        "pena_tang=0",
-        "--set",
-        "uplift=none",
-        "--levels",
-        "7.4,7.6",
-        "--no-fields",
-        "--no-picture",
-    )
+    words = "--set", "pena_tang=0", "--set", "uplift=none", "--no-fields", "--no-picture"
+    code, out, err = command("run", "c", *words, "--levels", "7.4,7.6")
     assert code == 1
     assert "sliding: no equilibrium beyond level 7.45" in out + err
 

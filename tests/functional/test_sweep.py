@@ -29,18 +29,8 @@ def rows(path):
 
 @pytest.mark.usefixtures("no_pictures")
 def test_rows_are_equal_to_single_runs(solve, command, tmp_path):
-    words = (
-        "sweep",
-        "c",
-        "--vary",
-        "mu=0.35,0.4",
-        "--vary",
-        "level=8,9",
-        "--jobs",
-        "1",
-        "--out",
-        "sweep.csv",
-    )
+    words = "sweep", "c", "--vary", "mu=0.35,0.4", "--vary", "level=8,9", "--jobs", "1"
+    words = *words, "--out", "sweep.csv"
     assert command(*words)[0] == 0
     table = rows(tmp_path / "sweep.csv")
     assert [(row["mu"], row["level_requested"]) for row in table] == [
@@ -99,20 +89,8 @@ def test_an_interrupted_sweep_ends_at_once_and_keeps_its_rows(tmp_path):
 
 @pytest.mark.usefixtures("no_pictures")
 def test_the_row_of_a_dam_that_slides_has_its_verdict(command, tmp_path):
-    command(
-        "sweep",
-        "c",
-        "--set",
-        "pena_tang=0",
-        "--set",
-        "uplift=none",
-        "--vary",
-        "mu=0.25,0.3",
-        "--jobs",
-        "1",
-        "--out",
-        "sweep.csv",
-    )
+    words = "--set", "pena_tang=0", "--set", "uplift=none", "--vary", "mu=0.25,0.3"
+    command("sweep", "c", *words, "--jobs", "1", "--out", "sweep.csv")
     for row in rows(tmp_path / "sweep.csv"):
         assert row["verdict"] == "sliding" and row["statement"].startswith("sliding")
         assert float(row["level"]) == pytest.approx(
@@ -124,20 +102,8 @@ def test_the_row_of_a_dam_that_slides_has_its_verdict(command, tmp_path):
 @pytest.mark.usefixtures("no_pictures")
 def test_all_rows_of_close_levels_converge_and_their_openings_increase(command, tmp_path):
     """Without tensile strength the shear is lost on opening, a jump of the law."""
-    command(
-        "sweep",
-        "a",
-        "--set",
-        "sigma_max=0",
-        "--vary",
-        "level=8:9:0.02",
-        "--set",
-        "n_joint=25",
-        "--jobs",
-        "1",
-        "--out",
-        "sweep.csv",
-    )
+    words = "--set", "sigma_max=0", "--vary", "level=8:9:0.02", "--set", "n_joint=25"
+    command("sweep", "a", *words, "--jobs", "1", "--out", "sweep.csv")
     openings = [
         float(row["max_opening"])
         for row in rows(tmp_path / "sweep.csv")
