@@ -125,23 +125,12 @@ def test_every_row_of_the_joint_table_obeys_the_law(solve, name, levels, nodes):
     picked = np.linspace(0, len(steps[0]["x"]) - 1, nodes).astype(int)
     for node in picked:
         column = lambda key: np.array([step[key][node] for step in steps])  # noqa: B023
+        stiffness = "K_N", "K_T", "pena_rupture", "pena_tang"
         answer = law.evaluate(
             result.case["law"],
             np.column_stack([column(n) for n in ("delta_n", "delta_t1", "delta_t2")]),
             column("p"),
-            {
-                n: result.case[n]
-                for n in (
-                    "K_N",
-                    "K_T",
-                    "sigma_max",
-                    "alpha",
-                    "pena_rupture",
-                    "mu",
-                    "adhesion",
-                    "pena_tang",
-                )
-            },
+            {n: result.case[n] for n in (*stiffness, "sigma_max", "alpha", "mu", "adhesion")},
         )
         for key in ("sigma_n", "tau_1"):
             assert_allclose(

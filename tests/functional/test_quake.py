@@ -1039,14 +1039,8 @@ def test_the_fragility_of_a_block_is_that_of_newmarks_slips(command, tmp_path):
     (tmp_path / "b.AT2").write_text("\n".join(lines))
     words = ["sweep", "dam", *(w for n, v in BLOCK.items() for w in ("--set", f"{n}={v}"))]
     words += ["--levels", "0", "--set", "dt=0.0025", "--jobs", "1", "--both-signs"]
-    words += [
-        "--quake",
-        "slip=0.01,slip=0.03",
-        "--vary",
-        "record_scale=0.9,1.4,2",
-        "--out",
-        "f.csv",
-    ]
+    words += ["--quake", "slip=0.01,slip=0.03", "--vary", "record_scale=0.9,1.4,2"]
+    words += ["--out", "f.csv"]
     code, out, _ = command(*words, "--record", "a.csv")
     assert code == 0 and "6 rows computed" in out
     code, out, _ = command(*words, "--record", "a.csv", "--record", "b.AT2")

@@ -24,15 +24,8 @@ def test_path_file_to_standard_output_and_to_a_file(command, tmp_path):
     assert (code, err) == (0, "")
     assert command(*words, "--out", "answer.csv") == (0, "", "")
     for table in (columns(out), columns((tmp_path / "answer.csv").read_text())):
-        assert list(table)[:7] == [
-            "delta_n",
-            "delta_t1",
-            "delta_t2",
-            "p",
-            "sigma_n",
-            "tau_1",
-            "tau_2",
-        ]
+        jumps, stresses = ["delta_n", "delta_t1", "delta_t2"], ["sigma_n", "tau_1", "tau_2"]
+        assert list(table)[:7] == [*jumps, "p", *stresses]
         assert_allclose(table["sigma_n"], [100, 50 - 1000, -1000], rtol=1e-9)
         assert_allclose(table["tau_1"], [0, 0, 1000], rtol=1e-9, atol=1e-9)
         assert_allclose(table["tau_2"], [0, 0, -500], rtol=1e-9, atol=1e-9)

@@ -12,20 +12,8 @@ PACKAGE = Path(damjoint.__file__).parent
 WITNESS, ROOT = PACKAGE.with_name("damjoint_witness"), Path(__file__).parents[2]
 #: Each part uses only those before it.
 PARTS = ["", "arrays", "units", "csr", "threads", "storage", "progress", "processes", "versions"]
-PARTS += [
-    "laws",
-    "input",
-    "mesh",
-    "model",
-    "fem",
-    "joint",
-    "solver",
-    "dynamics",
-    "engines",
-    "statics",
-    "post",
-]
-PARTS += ["pictures", "accuracy", "session", "runner", "studies", "verification"]
+PARTS += ["laws", "input", "mesh", "model", "fem", "joint", "solver", "dynamics", "engines"]
+PARTS += ["statics", "post", "pictures", "accuracy", "session", "runner", "studies", "verification"]
 PARTS += ["python_words", "library", "gui", "cli", "__main__"]
 
 

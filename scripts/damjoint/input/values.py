@@ -8,26 +8,12 @@ from typing import TYPE_CHECKING, Literal, TypeAlias, overload
 from ..arrays import Value, Values
 
 #: The parameters whose values are texts, for type checkers: all others are numbers.
-TextName: TypeAlias = Literal[
-    "law",
-    "uplift",
-    "face_load",
-    "drive",
-    "drive_load",
-    "drive_direction",
-    "drive_face",
-    "mesh_pattern",
-    "quadrature",
-    "force_face",
-    "drain_reference",
-    "softening",
-    "quake_uplift",
-    "required_position",
-    "record_unit",
-    "record_component",
-    "record_baseline",
-    "time_integration",
-]
+TextName: TypeAlias = (
+    Literal["law", "uplift", "softening", "drain_reference", "face_load", "force_face"]
+    | Literal["drive", "drive_load", "drive_direction", "drive_face", "mesh_pattern", "quadrature"]
+    | Literal["record_unit", "record_component", "record_baseline", "time_integration"]
+    | Literal["quake_uplift", "required_position"]
+)
 
 
 class ParameterValues:
