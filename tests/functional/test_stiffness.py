@@ -35,7 +35,7 @@ def test_the_command_prints_a_row_for_each_joint_and_what_is_refused(command):
     lifts = "--set", "lift_heights=20", "--set", "K_T=1e9", "--set", "G_t=100"
     words = "run", "dam", *WORDS, *lifts, "--levels", "30", "--no-picture", "--no-fields"
     code, out, _ = command(*words, "--sensitivity", "K_T")
-    assert code == 0 and "closes the joint by" in out
+    assert code == 0 and "K_N of joint base: the weight closes the joint by" in out
     assert sum(line.startswith("K_T x 10") for line in out.splitlines()) == 2
     assert "K_T / 10: G_t = 100: must be > 200 N/m" in out
 

@@ -43,10 +43,11 @@ def meaning(case: Case) -> str:
         weight = gravity.with_crack(joint, 0.0, 0.0, 0.0).N
         closed = with_unit(weight / (joint["K_N"] * length), LENGTHS, 3)
         closure = f"the weight closes the joint by {closed}; "
-    h = length / joint["n_joint"]
+    h, name = length / joint["n_joint"], case.named((0,))
     return (
-        f"K_N: {closure}K_N L/E = {joint['K_N'] * length / young:.3g}, K_N h/E = "
-        f"{joint['K_N'] * h / young:.3g}, K_T/K_N = {joint['K_T'] / joint['K_N']:.3g}"
+        f"K_N{name and f' of joint {name}'}: {closure}K_N L/E = "
+        f"{joint['K_N'] * length / young:.3g}, K_N h/E = {joint['K_N'] * h / young:.3g}, "
+        f"K_T/K_N = {joint['K_T'] / joint['K_N']:.3g}"
     )
 
 
