@@ -66,13 +66,15 @@ def run(
     key: str = "",
     further: Callable[[Results, Path], None] = lambda result, folder: None,
     stage: str = "",
+    on_saved: Callable[[Results], None] = lambda result: None,
 ) -> list[Results]:
     """Solve all scenes of a case and write their results below out, replacing an earlier run's.
 
     fields: also write displacement, stress and joint fields for Gmsh and ParaView; picture: also a
     PNG; engine: see `engine_of`; drawing: draws the pictures, by
     default this process does; key: see `Session`; further: writes further tables of a scene into
-    its folder; stage: what the progress says meanwhile.
+    its folder; stage: what the progress says meanwhile; on_saved: called with each scene's results
+    before fields and pictures are written, which may fail.
     Returns the results in the order of case.scenes(). A run that stops early or is interrupted
     writes its converged steps. Raises InputError, RunError.
     """
@@ -87,6 +89,8 @@ def run(
                 outcomes.append(outcome)
                 if outcome.error:
                     raise outcome.error
+        for outcome in outcomes:
+            on_saved(outcome.result)
         if fields or picture:
             write_fields_and_pictures(study, outcomes, fields, picture, drawing)
     return [outcome.result for outcome in outcomes]

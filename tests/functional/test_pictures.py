@@ -318,6 +318,17 @@ def test_a_drawing_process_that_is_killed_is_an_error(runs, tmp_path, monkeypatc
         drawing.wait()
 
 
+def test_the_table_of_a_run_is_printed_before_its_pictures_are_drawn(command, monkeypatch):
+    def ended(_):
+        raise RunError("the process that draws it has ended")
+
+    monkeypatch.setattr(DrawingProcess, "wait", ended)
+    small = "--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4", "--levels", "6"
+    code, out, err = command("run", "c", *small)
+    assert code == 1 and "has ended" in err and "c, uplift imposed: stands" in out
+    assert "N' at x" in out and "K_N h/E" in out
+
+
 def texts_of(figure):
     """All texts of a figure that are shown."""
     return [text.get_text() for text in figure.findobj(Text) if text.get_text()]

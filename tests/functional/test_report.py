@@ -102,6 +102,14 @@ def damaged(folder, name, text):
     (folder / name).write_text(text)
 
 
+def test_a_critical_value_names_the_joint_that_fails():
+    found = {"value": 40.0, "unit": "m", "of": "level", "doubt": "", "mode": "sliding"}
+    found |= {"joint": "lift 9 m", "gravity_method": 41.0, "gravity_method_joint": "base"}
+    words = "critical level 40 m; sliding on lift 9 m; gravity method on base 41 m"
+    assert words in report.critical_value(found)
+    assert "40 m; sliding;" in report.critical_value(found | {"joint": ""})
+
+
 @pytest.mark.parametrize("words", [("plot",), ("report", "--to", "page.html")])
 @pytest.mark.parametrize(
     "harm, message",

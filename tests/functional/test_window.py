@@ -796,6 +796,7 @@ def test_stop_keeps_the_steps_of_an_earthquake(open_window, tmp_path):
     user.wait(lambda session: session.live)  # its results so far, while it is computed
     assert tree.get_text(tree.VERDICT) == "running" and user.session.busy == "running"
     live = len(user.session.scenes[1].times)
+    assert any(" s (running), ground acceleration" in line for line in shown_results()[2])
     assert live > 1 and numbers_shown(user)["At t = " + f"{user.session.scenes[1].times[-1]:.4g} s"]
     user.wait(lambda session: len(session.scenes[1].times) > live)
     user.press("stop")

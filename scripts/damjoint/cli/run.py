@@ -11,6 +11,7 @@ from .cases import load_case
 from .options import Parser, deviations, say, table_width
 
 if TYPE_CHECKING:
+    from ..model.results import Results
     from ..pictures.drawing_process import DrawingProcess
 
 
@@ -66,7 +67,9 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
         options["further"] = partial(sensitivity.write, names, picture, deviations=of_names)
         options["stage"] = sensitivity.STAGE
     options |= {"engine": arguments.engine, "drawing": drawing}
-    for result in run(case, out, fields, picture, **options):
+
+    def show(result: Results) -> None:
+        """Print a scene, before its pictures are drawn."""
         steps, iterations = len(result.history["time"]), int(result.history["iterations"].sum())
         say(
             f"{case.name}, uplift {result.case['uplift']}: {verdict(result)}; {steps} "
@@ -89,6 +92,9 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
         lines.append(result.info.get("error_estimate", {}).get("statement", ""))
         if any(lines):
             say("", *filter(None, lines))
+
+    options["on_saved"] = show
+    for result in run(case, out, fields, picture, **options):
         repeated = stiffness.named_in(arguments.sensitivity or "")
         if repeated and result.last:
             runs = stiffness.repetitions(result.case, result, repeated, arguments.engine)

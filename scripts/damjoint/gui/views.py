@@ -24,6 +24,7 @@ from ..model.fields import (
     nearest_rows,
     state_of,
 )
+from ..studies.quake import RUNNING
 from ..units import LENGTHS, STRESSES, unit, unit_of_time, with_unit
 from . import layout as places
 from .camera import CLIPPED, undeformed_camera
@@ -179,8 +180,10 @@ def caption(scene: SolvedScene, step: int) -> tuple[str, str, str]:
         rows = scene.numbers[step].rows()
         words = {label: f"{label} {value}" for label, value, _ in rows}
         on_joint = ", ".join(words[n] for n in ("heel opening", "toe opening", "slip"))
+        end = f"of {scene.quake['time'][-1]:.4g} s"
+        end = f"({RUNNING})" if scene.verdict == RUNNING else end  # how far, the status line says
         return (
-            f"t = {time:.3f} s of {scene.quake['time'][-1]:.4g} s, {words['ground acceleration']}",
+            f"t = {time:.3f} s {end}, {words['ground acceleration']}",
             f"{words['crest movement']}, {words['crest acceleration']}",
             f"{name}: {on_joint}" if name else on_joint,
         )

@@ -649,7 +649,9 @@ def critical_value(info: dict[str, Any] | None) -> str:
         return ""
     unit = info["unit"]
     doubt = f"not confirmed: {info['doubt']}" if info["doubt"] else ""
-    parts = [p for p in (f"{info['value']:.6g} {unit}".strip(), doubt, info["mode"]) if p]
+    mode, failing = info["mode"], info.get("joint")
+    mode = f"{mode} on {failing}" if mode and failing else mode
+    parts = [p for p in (f"{info['value']:.6g} {unit}".strip(), doubt, mode) if p]
     on = f" on {joint}" if (joint := info.get("gravity_method_joint")) else ""
     by_hand = {f"gravity method{on}": info["gravity_method"]}
     by_hand[f"on {info.get('joint')}"] = info.get("gravity_method_there")
