@@ -80,7 +80,7 @@ class Reliability(WithTables):
         beta, probabilities form, breitung, tvedt (SORM), sampled with the limits low, high of its
         95 % interval; nan where a method has none. The table levels, one row per critical level as
         in reliability.csv: of_joint, the varied values, critical_level [m], mode, joint, confirmed,
-        confirmed_by, its derivatives d_...; nan where it has none.
+        confirmed_by, its derivatives `d_NAME`; nan where it has none.
         """
         names = "joint", "beta", "form", "breitung", "tvedt", "sampled", "low", "high"
         cells = {n: [getattr(one, n) for one in self.results] for n in names}
