@@ -167,11 +167,11 @@ def with_mixed(settings: Drawn, rng: RandomNumbers) -> Drawn:
 
 
 def with_time(settings: Drawn, rng: RandomNumbers) -> Drawn:
-    """Settings, in some of plane dams with flow that of the water in time, within its conditions:
-    no joint with `cracked`, no earthquake, no controlled displacement.
+    """Settings, in some of dams with flow that of the water in time, within its conditions: no
+    joint with `cracked`, no earthquake, no controlled displacement.
     """
     waters = set(np.ravel(settings["uplift"]))
-    other = {"dim", "drive", "k_h"} & settings.keys()
+    other = {"drive", "k_h"} & settings.keys()
     if not rng.event(0.5) or "flow" not in waters or "cracked" in waters or other:
         return settings
     return settings | {

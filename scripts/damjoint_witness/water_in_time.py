@@ -1,10 +1,11 @@
-"""Pressure of water that flows in the joints in time (2D), replayed along the written openings.
+"""Pressure of water that flows in the joints in time, replayed along the written openings.
 
 With `time_unit` > 0, and in an earthquake with `quake_uplift = transient`: section 5 of
 reference/theory.md. In every step what each node stores, S p + V - v, balances what flows to it:
-implicit Euler, V and S lumped, voids v complementary to the pressure above `pressure_min`. The
-linear equations are solved in numbers of PRECISION digits, the nodes with voids found one set after
-the other.
+implicit Euler, V and S lumped, voids v complementary to the pressure above `pressure_min`. In 2D
+the linear equations are solved in numbers of PRECISION digits, in 3D those of finite elements of
+order 1, whose entries beside the diagonal are conductances between pairs of nodes. The nodes with
+voids are found one set after the other.
 """
 
 from __future__ import annotations
@@ -12,17 +13,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal, localcontext
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy import sparse
 from scipy.spatial import cKDTree
 
 from .files import Files, Table, rows_where, split_by
 from .reader import Asked
-from .solids import Array, functions
+from .solids import Array, IntArray, functions
 from .water import (
     DIGITS,
+    IN_3D,
     PRECISION,
     SAME_TIME,
     Flow,
@@ -35,6 +37,7 @@ from .water import (
     networks,
     places,
     states,
+    update_at,
     with_all_digits,
 )
 
@@ -43,24 +46,35 @@ UNLOADED = -1
 #: Sets of nodes with voids at most. Where water runs down from nodes with voids, some may have
 #: voids as long as they count as full, and none without: no set is the right one.
 MOST_SETS = 50
+#: Error of the mass of the water over what is stored and has come in at all nodes.
+MASS = 1e-6
 #: Pressure below the least one over the largest head, and a void below zero over what the node
 #: stores, up to which they count as rounding [-].
 ROUNDING = 1e-12
 
 
-def applies(asked: Asked) -> bool:
-    """Whether water is stored in the joints of a run in 2D."""
-    first = asked.joints[0]
-    return bool(first["dim"] == 2 and any(joint["uplift"] == "flow" for joint in asked.joints))
+def applies(files: Files, asked: Asked) -> bool:
+    """Whether water may be stored in the joints of a run; in 3D one with fields, which have the
+    elements of the joints.
+    """
+    known = asked.joints[0]["dim"] == 2 or (files.folder / "fields").is_dir()
+    return known and any(joint["uplift"] == "flow" for joint in asked.joints)
 
 
 @dataclass(frozen=True)
 class Stored:
-    """Water at the nodes (n,) [m3 per metre]: stored, voids, what has come in so far."""
+    """Water at the nodes (n,) [m3; 2D: per metre]: stored, voids, what has come in so far."""
 
     volume: Array
     void: Array
     inflow: Array
+    #: by which the last digits of the heads may have changed what has come in so far (n,)
+    digits: Array
+
+    def mixed(self, share: float, other: Stored) -> Stored:
+        """Return the mean with a share of another state."""
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return Stored(*((1 - share) * own + share * its for own, its in pairs))
 
 
 #: Without drains, and with drains of full effect.
@@ -93,21 +107,25 @@ class Slot:
         """Height of the nodes times the weight of water (n,) [Pa]."""
         return np.asarray(self.network.first.unit_weight * self.network.nodes[:, 1])
 
-    def lumped(self, uniform: bool) -> Array:
-        """Return the integral of the aperture, of 1 if uniform, lumped at the nodes (n,)."""
+    def lumped(self, uniform: bool, only: int | None = None) -> Array:
+        """Return the integral of the aperture, of 1 if uniform, lumped at the nodes (n,); only:
+        that over one of the joints.
+        """
         total = np.zeros(len(self.network.nodes))
         parts = zip(self.network.joints, self.network.tables, self.network.widening, strict=True)
-        for joint, (table,), (factor,) in parts:
-            (sides,) = joint.sides
-            u, w = joint_rule(sides.shape, sides.order, joint.values["quadrature"])
-            aperture = np.ones_like(factor) if uniform else joint.values["aperture_min"] * factor
-            sizes = aperture * np.outer(sides.measures, w)
-            np.add.at(total, table, sizes @ functions(sides.shape, 1, u))
+        for k, (joint, tables, widening) in enumerate(parts):
+            if only not in (None, k):
+                continue
+            for sides, table, factor in zip(joint.sides, tables, widening, strict=True):
+                u, w = joint_rule(sides.shape, sides.order, joint.values["quadrature"])
+                aperture = joint.values["aperture_min"] * factor
+                sizes = np.outer(sides.measures, w) * (1 if uniform else aperture)
+                np.add.at(total, table, sizes @ functions(sides.shape, 1, u))
         return total
 
     @property
     def storage(self) -> Array:
-        """What the nodes store by pressure (n,) [m3/Pa per metre]."""
+        """What the nodes store by pressure (n,) [m3/Pa; 2D: per metre]."""
         return np.asarray(self.network.first.values["storage"] * self.lumped(uniform=True))
 
     def at_rest(self) -> Histories:
@@ -120,13 +138,13 @@ class Slot:
 
         def under(heads: Array) -> Stored:
             pressure = np.maximum(weight * heads - self.elevation, 0)
-            return Stored(self.lumped(False) + self.storage * pressure, nothing, nothing)
+            return Stored(self.lumped(False) + self.storage * pressure, nothing, nothing, nothing)
 
         return under(free), under(network.solve(False, outlets).heads if act else free)
 
-    def step(self, begins: Histories, seconds: float) -> tuple[Array, Histories]:
-        """Return the pressure at the nodes (n,) [Pa] at the end of a step, and what is stored: the
-        water without drains, and that with drains of full effect, have histories of their own.
+    def step(self, begins: Histories, seconds: float) -> tuple[Filled, Histories]:
+        """Return the end of a step, and what is stored by its parts: the water without drains, and
+        that with drains of full effect, have histories of their own.
         """
         drains, effect = self.network.drains()
         weight = self.network.first.unit_weight
@@ -136,7 +154,15 @@ class Slot:
         if outlets and all(total[n] > head for n, head in outlets.items()):
             drained = self.without_drains(begins[1], seconds, outlets)
         pressure = (1 - effect) * free.pressure + effect * drained.pressure
-        return pressure, (free.stored, drained.stored)
+        mean = free.stored.mixed(effect, drained.stored)
+        return Filled(pressure, mean, free.drops), (free.stored, drained.stored)
+
+    def of_joint(self, joint: int, values: Array) -> float:
+        """Return the sum of values (n,) at the nodes of a joint, per metre of thickness: at a node
+        of several joints by the part of its area that is this joint's.
+        """
+        share = self.lumped(True, joint) / self.lumped(True)
+        return float(share @ values) / (float(np.ptp(self.network.nodes[:, 2])) or 1.0)
 
     def without_drains(self, begin: Stored, seconds: float, fixed: dict[int, float]) -> Filled:
         """Return the end of a step, see `step`; fixed: heads times the weight of water [Pa] beside
@@ -156,10 +182,14 @@ class Slot:
             for n in nodes.tolist():
                 dry[n] = level <= network.nodes[n, 1]
                 known[n] = max(first.unit_weight * level, float(elevation[n]))
-        graph = network.operator(False, drops)
-        assert isinstance(graph, Graph)  # in the plane
-        pairs = graph.pairs
-        conductances = graph.conductances / (12 * first.values["visc"])
+        operator = network.operator(False, drops)
+        solve = solved if isinstance(operator, Graph) else solved_by_matrix
+        pairs, conductances = (
+            (operator.pairs, operator.conductances)
+            if isinstance(operator, Graph)
+            else pairs_of(operator.matrix)
+        )
+        conductances = conductances / (12 * first.values["visc"])
         volume, storage = self.lumped(False), self.storage
         ground, rest = storage / seconds, begin.volume - volume + storage * elevation
         falls = conductances * (elevation[pairs[:, 0]] - elevation[pairs[:, 1]])
@@ -176,7 +206,7 @@ class Slot:
             lacking = lacking - np.bincount(pairs[:, 1], missing, number)
             heads = known | {int(n): lowest + float(elevation[n]) for n in np.flatnonzero(voids)}
             source = rest / seconds + lacking
-            total, out, falling = solved(pairs, conductances, ground, source, heads)
+            total, out, falling = solve(pairs, conductances, ground, source, heads)
             pressure = total - elevation
             excess = volume + storage * pressure - begin.volume + seconds * (out - lacking)
             largest = np.abs(total).max()
@@ -189,18 +219,41 @@ class Slot:
                 void = np.where(voids | dry, np.maximum(excess, 0), 0)
                 inflow = np.where(is_known, np.where(dry, np.minimum(excess, 0), excess), 0)
                 stored = volume + storage * pressure - void
-                end = Stored(stored, void, begin.inflow + inflow)
+                digits = begin.digits + np.where(is_known, least, 0)
+                end = Stored(stored, void, begin.inflow + inflow, digits)
                 return Filled(pressure, end, falling / first.unit_weight)
             voids, air = (voids | empties) & ~fills, drawn
         raise NoSet
 
 
+def pairs_of(matrix: Any) -> tuple[IntArray, Array]:
+    """Return the pairs of nodes that a symmetric matrix whose rows have the sum 0 connects (m, 2),
+    and their conductances (m,).
+    """
+    upper = sparse.triu(matrix, 1).tocoo()
+    return np.column_stack([upper.row, upper.col]).astype(int), -upper.data
+
+
+def solved_by_matrix(
+    pairs: IntArray, conductances: Array, ground: Array, source: Array, fixed: dict[int, float]
+) -> tuple[Array, Array, Array]:
+    """Return what `solved` does, by a dense matrix."""
+    number = len(ground)
+    matrix = np.zeros((number, number))
+    np.add.at(matrix, (pairs[:, 0], pairs[:, 1]), -conductances)
+    matrix += matrix.T
+    np.fill_diagonal(matrix, -matrix.sum(axis=1))
+    heads = np.zeros(number)
+    heads[list(fixed)] = list(fixed.values())
+    free = np.setdiff1d(np.arange(number), list(fixed))
+    if len(free):
+        own = matrix[np.ix_(free, free)] + np.diag(ground[free])
+        heads[free] = np.linalg.solve(own, source[free] - matrix[free] @ heads)
+    return heads, matrix @ heads, heads[pairs[:, 0]] - heads[pairs[:, 1]]
+
+
 def solved(
-    pairs: NDArray[np.int_],
-    conductances: Array,
-    ground: Array,
-    source: Array,
-    fixed: dict[int, float],
+    pairs: IntArray, conductances: Array, ground: Array, source: Array, fixed: dict[int, float]
 ) -> tuple[Array, Array, Array]:
     """Return heads (n,) of the flow with what nodes store, ground (n,), and sources (n,), for fixed
     heads by node; what flows out of each node (n,); the drops along the pairs (m,). The others are
@@ -271,11 +324,14 @@ def steps_of(asked: Asked, updates: Sequence[Table]) -> Iterator[Update]:
 
 @dataclass(frozen=True)
 class Wet:
-    """The water of a network after an update, by its number: pressure at the nodes (n,) [Pa]."""
+    """The water of a network after an update, by its number: pressure at the nodes (n,) [Pa], and
+    what is stored; None: not known.
+    """
 
     number: int
     network: Network
     pressure: Array
+    stored: Stored | None
 
     def heads(self) -> dict[int, Heads]:
         """Return the head of each joint by its number."""
@@ -291,7 +347,7 @@ def replayed(files: Files, asked: Asked, steps: Table) -> Iterator[Wet]:
     """Yield the water of all networks that flow in time, after every update in which they do; the
     written one after a step without a set of nodes with voids.
     """
-    if not applies(asked):
+    if not applies(files, asked):
         return
     updates = updates_of(asked, steps)
     plan = list(steps_of(asked, updates[0]))
@@ -312,12 +368,13 @@ def replayed(files: Files, asked: Asked, steps: Table) -> Iterator[Wet]:
             if which not in lost:
                 begin = known.get((which, step.begin)) or before[which].at_rest()
                 try:
-                    pressure, known[which, step.number] = slot.step(begin, step.seconds)
+                    end, known[which, step.number] = slot.step(begin, step.seconds)
+                    yield Wet(step.number, slot.network, end.pressure, end.stored)
                 except NoSet:
                     lost.add(which)
             if which in lost:
                 pressure = written(slot.network, [of[step.number] for of in updates])
-            yield Wet(step.number, slot.network, pressure)
+                yield Wet(step.number, slot.network, pressure, None)
 
 
 def written(network: Network, updates: Sequence[Table]) -> Array:
@@ -337,26 +394,60 @@ def heads_in_time(files: Files, asked: Asked, steps: Table) -> dict[float, dict[
     found: dict[float, dict[int, Heads]] = {}
     if not asked.joints[0]["time_unit"]:
         return found
-    first = updates_of(asked, steps)[0] if applies(asked) else []
+    first = updates_of(asked, steps)[0] if applies(files, asked) else []
     for wet in replayed(files, asked, steps):
         found.setdefault(float(first[wet.number]["update"][0]), {}).update(wet.heads())
     return found
 
 
 def violations(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
-    """Yield of each joint the step whose pressure is wrong, and by how much the worst one is."""
+    """Yield of each joint the step whose pressure is wrong, and by how much the worst one is; rows
+    of history.csv with another mass of the water.
+    """
     worst: dict[int, tuple[float, float]] = {}
-    updates = updates_of(asked, steps)
+    masses = dict[int, str]()
+    updates, room = updates_of(asked, steps), DIGITS if asked.joints[0]["dim"] == 2 else IN_3D
+    rows = rows_of_updates(files, steps)
     for wet in replayed(files, asked, steps):
         found = written(wet.network, [of[wet.number] for of in updates])
+        row = rows.get(float(updates[0][wet.number]["update"][0]))
         for k, joint in enumerate(wet.network.joints):
             own = wet.network.nodes_of(k)
             error = float(np.abs(found[own] - wet.pressure[own]).max())
             scale = joint.unit_weight * max(joint.level, joint.tail, joint.values["dam_height"])
-            if not error <= DIGITS * scale and error > worst.get(joint.number, (0.0, 0.0))[0]:
+            if not error <= room * scale and error > worst.get(joint.number, (0.0, 0.0))[0]:
                 worst[joint.number] = error, float(updates[0][wet.number]["time"][0])
+            for text in () if row is None else mass(files, wet, k, row):
+                masses.setdefault(joint.number, text)
     for k, (error, time) in worst.items():
         yield f"joint {k + 1}: p of the flow in time off by {error:.3g} Pa at t = {time:g}"
+    yield from masses.values()
+
+
+def rows_of_updates(files: Files, steps: Table) -> dict[float, int]:
+    """Return the row of history.csv by the column `update`, of the static loads."""
+    still = rows_where(steps, steps["earthquake"] == 0)
+    pairs = zip(files.history["time"].tolist(), files.history["level"].tolist(), strict=True)
+    return {update_at(still, time, level): n for n, (time, level) in enumerate(pairs)}
+
+
+def mass(files: Files, wet: Wet, joint: int, row: int) -> Iterator[str]:
+    """Yield how the columns `water`, `water_in` and `void` of a row of history.csv differ from the
+    water of a joint of a network.
+    """
+    stored, slot = wet.stored, Slot(wet.network)
+    number = wet.network.joints[joint].number
+    history = files.history_of(number)
+    if stored is None or "water" not in history:
+        return
+    moved = slot.of_joint(joint, stored.volume + stored.void + np.abs(stored.inflow))
+    digits = slot.of_joint(joint, stored.digits)
+    columns = {"water": stored.volume, "water_in": stored.inflow, "void": stored.void}
+    for name, values in columns.items():
+        exact, value = slot.of_joint(joint, values), float(history[name][row])
+        if not abs(value - exact) <= MASS * moved + digits:
+            off = f"{name} = {value:.9g} m2, from the openings {exact:.9g}"
+            yield f"joint {number + 1}: {off} at t = {history['time'][row]:g}"
 
 
 def updates_of(asked: Asked, steps: Table) -> list[list[Table]]:

@@ -52,7 +52,8 @@ SCENES_3D = {
     for pattern in ("free", "layers")
 } | {
     "regular": "run dam --set dim=3 --set mesh_pattern=regular --set order=1 --set uplift=flow "
-    "--set drains=1 --set drain_x=9 --levels 44"
+    "--set drains=1 --set drain_x=9 --set drain_effectiveness=0.6 --set time_unit=60 --set "
+    "time_start=1 --set storage=1e-11 --levels 40,44 --steps 2"
 }
 
 
@@ -110,7 +111,18 @@ def test_films_are_told_apart(written, name):
 @pytest.mark.parametrize("name", SCENES_3D)
 def test_water_and_jumps_in_3d(written, name):
     assert found(water, *written(name)) == []
+    assert found(water_in_time, *written(name)) == []
     assert found(elasticity, *written(name)) == []
+
+
+@pytest.mark.heavy
+def test_water_that_is_stored_is_replayed_in_3d(written):
+    folder, words = written("regular")
+    for changed in ("time_unit=61", "storage=1.1e-11", "drain_effectiveness=0.61"):
+        name = changed.split("=")[0]
+        other = tuple(changed if word.startswith(f"{name}=") else word for word in words)
+        problems = "".join(found(water_in_time, folder, other))
+        assert "p of the flow in time off" in problems and "water = " in problems, changed
 
 
 def altered(folder, tmp_path, name, column, factor):
@@ -134,6 +146,9 @@ def altered(folder, tmp_path, name, column, factor):
         ("flow", "joint.csv", "flux", 1.0001, "flux off"),
         ("flow", "history.csv", "flux", 1.0001, "leakage off"),
         ("flow", "steps.csv", "delta_n", 1.0001, "p off"),
+        ("flood", "history.csv", "water", 1 + 1e-5, "joint 1: water = "),
+        ("flood", "history.csv", "water_in", 1 + 1e-4, "joint 1: water_in = "),
+        ("flood", "history.csv", "void", 1 + 1e-3, "joint 1: void = "),
         ("lifts", "joint.csv", "p", 1 + 1e-6, "joint 3: p off"),
         ("monoliths", "joint.csv", "p", 1 + 1e-6, "joint 2: p off"),
     ],
@@ -141,7 +156,8 @@ def altered(folder, tmp_path, name, column, factor):
 def test_altered_water_is_noticed(written, tmp_path, name, table, column, factor, what):
     folder, words = written(name)
     copy = altered(folder, tmp_path, table, column, factor)
-    assert any(what in violation for violation in found(water, copy, words))
+    check = water_in_time if name == "flood" else water
+    assert any(what in violation for violation in found(check, copy, words))
 
 
 @pytest.mark.parametrize("column", ["delta_n", "delta_t1", "sigma_n_eff", "tau_1"])
