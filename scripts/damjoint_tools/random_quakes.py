@@ -123,7 +123,7 @@ def random_quake(seed: int, number: int, folder: Path) -> RandomQuake:
         settings = with_mixed(settings, RandomNumbers(seed, number, MIXED_DRAWS))
     settings = with_curve(settings, RandomNumbers(seed, number, CURVE_DRAWS))
     drawn_scene = replace(drawn_scene, settings=settings)
-    if solid or kind != DAM:
+    if kind != DAM:
         return drawn_scene
     return with_transient(drawn_scene, RandomNumbers(seed, number, TIME_DRAWS))
 

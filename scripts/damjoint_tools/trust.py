@@ -51,11 +51,11 @@ COMPARED = (
         "1e-9 of the largest pressure, 1e-6 in 3D",
     ),
     (
-        "pressure of flow in time (`time_unit`, `quake_uplift` = transient; 2D)",
+        "pressure and mass of the water in time (`time_unit`, `quake_uplift` = transient)",
         "what each node stores and what flows to it, replayed step by step along the written "
-        "openings, with voids and drains; no longer after a step in which water that runs down "
-        "leaves no set of nodes with voids",
-        "1e-9 of the largest pressure",
+        "openings, with voids and drains, in 3D by finite elements on the written faces; no longer "
+        "after a step in which water that runs down leaves no set of nodes with voids",
+        "1e-9 of the largest pressure, 1e-6 in 3D; 1e-6 of the mass",
     ),
     (
         "displacement jumps",
@@ -100,7 +100,7 @@ time limit is a defect.
 
 Not checked here: stresses in the bodies and pictures; the default values themselves; that the
 branch which the load steps follow is the one that a dam would take, where there are several
-equilibria; geometries of one's own, but for two blocks whose joints meet; flow in time in 3D;
+equilibria; geometries of one's own, but for two blocks whose joints meet; turbulent flow in 3D;
 the reference GetDP model (the tests compare it with the engine of these runs)."""
 
 #: What `damjoint stress --quake` verifies in every scene, and beside it.
@@ -223,7 +223,7 @@ def quake_section(rows: list[Row]) -> str:
         "1e9 to 1e13 Pa/m, all laws, all uplifts, "
         "batter, sloping joint, one to three joints (most "
         "of the lift joints with a law and water of their own); added mass, water in the crack by "
-        "each rule (in time in 2D), damping of 1 to 10 % with and without its part by the mass, "
+        "each rule, damping of 1 to 10 % with and without its part by the mass, "
         "dashpots in the joint, rock with mass; `hht_alpha` of 0, -0.05, -0.2, and the published "
         "scheme. Records of 0.8 to 1.6 s of three waves of 1 to 9 Hz, up to 1 g, most with a "
         "vertical component, of both signs. One scene in eight each has an elastic joint (no "

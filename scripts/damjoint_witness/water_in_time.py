@@ -151,7 +151,8 @@ class Slot:
         outlets = {n: weight * head for n, head in drains.items()}
         free, drained = (self.without_drains(begin, seconds, {}) for begin in begins)
         total = drained.pressure + self.elevation
-        if outlets and all(total[n] > head for n, head in outlets.items()):
+        least = ROUNDING * np.abs(total).max()
+        if outlets and all(total[n] > head + least for n, head in outlets.items()):
             drained = self.without_drains(begins[1], seconds, outlets)
         pressure = (1 - effect) * free.pressure + effect * drained.pressure
         mean = free.stored.mixed(effect, drained.stored)

@@ -34,6 +34,11 @@ SCENES = {
     "flood": "run dam --set law=friction --set adhesion=0 --set mu=1.5 --set dam_base=28 --set "
     "order=1 --set uplift=flow --set time_unit=3 --set storage=1e-11 --set pressure_min=-1e5 --set "
     "drains=1 --set drain_x=7 --levels 30,44,40 --tail-levels 0,5,2 --steps 3",
+    "voids at drains": "run dam --set dam_height=42.3 --set dam_base=21.1 --set dam_crest=3.02 "
+    "--set E=2e12 --set order=1 --set K_N=7e11 --set sigma_max=0 --set alpha=2 "
+    "--set weight_first=0 --set joint_slope=7.5 --set uplift=flow --set aperture_min=7e-8 "
+    "--set drains=1 --set drain_x=7 --set drain_effectiveness=0.3 --set time_unit=660 "
+    "--set storage=6e-13 --levels 43 --steps 4",
     "turbulent film": "run dam --set law=friction --set adhesion=0 --set mu=1.5 --set dam_base=28 "
     "--set order=1 --set lift_heights=20 --set uplift=flow,cracked --set turbulent=1 "
     "--set visc=1e-5 --set aperture_elastic=2e-4 --set drains=1 --set drain_x=7 --levels 30,44 "
