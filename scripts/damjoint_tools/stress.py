@@ -51,6 +51,9 @@ CLASSES = VERIFIED, JUSTIFIED, UNDECIDED, DEFECT = (
     *("converged and verified", "stopped and justified", "stopped, undecided", "defect"),
 )
 
+#: What only a part of the dams has, by a part of its command.
+IN_TIME = {"flow in time": "time_unit="}
+
 #: Every how many scenes the load steps and the critical level are computed again.
 AGAIN = 5
 
@@ -238,25 +241,32 @@ def row_of(seed: int, number: int, records: Path | None, parent: Path) -> dict[s
     scene = random_quake(seed, number, records) if records else random_scene(seed, number)
     with tempfile.TemporaryDirectory() as folder:
         row = run_and_verify(scene, Path(folder), twice=number % AGAIN == 0)
-    return {"scene": f"{seed}-{number}"} | row
+    return {"scene": name_of(seed, number)} | row
 
 
 def rows_as_completed(
-    seed: int, numbers: list[int], jobs: int, records: Path | None
+    scenes: list[tuple[int, int]], jobs: int, records: Path | None
 ) -> Iterator[dict[str, object]]:
-    """Compute the rows of scenes in parallel, in the order in which they are finished."""
+    """Compute the rows of scenes, by seed and number, in parallel, in the order in which they are
+    finished.
+    """
     # removed by this process, as the others may be killed, with their commands
     folder = tempfile.TemporaryDirectory(prefix="damjoint-", ignore_cleanup_errors=True)
     with folder as name, pool_of(jobs) as pool:
-        waiting = [pool.submit(row_of, seed, number, records, Path(name)) for number in numbers]
+        waiting = [pool.submit(row_of, *scene, records, Path(name)) for scene in scenes]
         yield from (future.result() for future in as_completed(waiting))
 
 
 def stress(
-    count: int, seed: int, out: Path, jobs: int | None = None, quake: bool = False
+    count: int,
+    seed: int,
+    out: Path,
+    jobs: int | None = None,
+    quake: bool = False,
+    seeds: int = 1,
 ) -> list[dict[str, str]]:
-    """Run those of the scenes 0 .. count - 1 of a seed that are not in the result file yet; returns
-    the rows of all.
+    """Run those of the scenes 0 .. count - 1 of so many seeds, from a first one on, that are not in
+    the result file yet; returns the rows of all.
 
     out: CSV of COLUMNS; a row is written when its scene is finished. quake: earthquakes, with their
     records in a folder beside the file. Raises InputError, also if the rows in the file were
@@ -265,18 +275,23 @@ def stress(
     if not find_spec("skfem"):
         raise InputError("stress: needs scikit-fem; install it by pip install 'damjoint[test]'")
     now = provenance()
-    names = [f"{seed}-{number}" for number in range(count)]
-    about = {"stress": {"rows": count, "seed": seed, "quake": quake}}
+    scenes = list(itertools.product(range(seed, seed + seeds), range(count)))
+    about = {"stress": {"rows": len(scenes), "seed": seed, "seeds": seeds, "quake": quake}}
     with rows_session("stress", out, COLUMNS, ("dim", "seconds"), about) as (study, done):
         same_code(out, done.values(), now)
-        missing = [number for number, name in enumerate(names) if name not in done]
+        missing = [scene for scene in scenes if name_of(*scene) not in done]
         records = out.resolve().with_name(f"{out.stem}_records") if quake else None
-        rows = rows_as_completed(seed, missing, jobs or os.cpu_count() or 1, records)
+        rows = rows_as_completed(missing, jobs or os.cpu_count() or 1, records)
         for row in track(rows, "stress", len(missing)):
             cells = row | now
             study.add([str(cells.get(name, "")) for name in COLUMNS])
         done = study.file.read()
-    return [done[name] for name in names]
+    return [done[name_of(*scene)] for scene in scenes]
+
+
+def name_of(seed: int, number: int) -> str:
+    """Return the name of a scene."""
+    return f"{seed}-{number}"
 
 
 def same_code(out: Path, rows: Iterable[dict[str, str]], now: dict[str, str]) -> None:

@@ -11,7 +11,7 @@ from .markdown import markdown
 from .mutations import MUTATIONS
 from .provenance import source_line
 from .quake_comparison import MEASURES
-from .stress import CLASSES, DEFECT, UNDECIDED, counts, read_rows
+from .stress import CLASSES, DEFECT, IN_TIME, UNDECIDED, counts, read_rows
 
 #: Place of each mutation in the table.
 NUMBERS = {mutation.name: number for number, mutation in enumerate(MUTATIONS)}
@@ -177,7 +177,7 @@ def dam_section(rows: list[Row]) -> str:
         markdown(COMPARED, ("quantity", "is compared with", "to")),
         UNDECIDED_OR_NOT,
         "## Result",
-        classes(rows, "law", "uplift", "joints", "dim", "drive"),
+        classes(rows, "law", "uplift", "joints", "dim", "drive", with_words=IN_TIME),
         "## Defects and undecided stops",
         unsolved(rows),
         "## The slowest scenes",

@@ -17,6 +17,9 @@ def add(command: Parser) -> None:
         "count", 1, nargs="?", default=500, help="number of random dams (default: 500)"
     )
     command.add_integer("--seed", 1, default=1, help="seed of the random numbers (default: 1)")
+    command.add_integer(
+        "--seeds", 1, default=1, help="so many dams of each of so many seeds (default: 1)"
+    )
     command.add_argument("--quake", action="store_true", help="random earthquakes instead")
     command.add_argument(
         "--mutate",
@@ -35,15 +38,23 @@ def call(arguments: argparse.Namespace) -> int:
     if arguments.mutate:
         return mutate(arguments)
     stress = tool("stress")
-    options = arguments.seed, arguments.out, arguments.jobs, arguments.quake
+    options = arguments.seed, arguments.out, arguments.jobs, arguments.quake, arguments.seeds
     rows = stress.stress(arguments.count, *options)
     for row in rows:
         if row["class"] == stress.DEFECT:
             print(f"{row['scene']}: {row['findings']}\n  {row['command']}")
+    for kind, part in stress.IN_TIME.items():
+        chosen = [row for row in rows if part in row["command"]]
+        if chosen:
+            print(f"{kind}: {as_counted(stress.counts(chosen))}")
     numbers = stress.counts(rows)
-    counted = "; ".join(f"{number} {name}" for name, number in numbers.items())
-    print(counted, arguments.out, sep="; ")
+    print(as_counted(numbers), arguments.out, sep="; ")
     return int(numbers[stress.DEFECT] > 0)
+
+
+def as_counted(numbers: dict[str, int]) -> str:
+    """Numbers of scenes by class, in words."""
+    return "; ".join(f"{number} {name}" for name, number in numbers.items())
 
 
 def mutate(arguments: argparse.Namespace) -> int:
