@@ -171,7 +171,8 @@ def test_lifts_without_python(project):
 SHARED = ("_regions", "_joints")  # ends of files that cases share
 FILES = {kind: {f.stem for f in data("cases").glob(f"*.{kind}")} for kind in ("geo", "pro")}
 WINDOWED = sorted(name for name in FILES["pro"] if not name.endswith(SHARED))
-#: Of a case in Gmsh: another level of the mesh than the case's
+#: Of a case in Gmsh: another level of the mesh than the case's; that of valley_blocks, as the line
+#: from heel to toe of a curved base, to which N and T refer, is in its .pro file
 COARSER = {"n_joint": 10.0}
 
 
