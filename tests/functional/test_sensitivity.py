@@ -243,6 +243,19 @@ def test_the_printed_table_fits_the_terminal():
         assert printed.endswith("at a kink: lift 12 m.adhesion, lift 25 m.adhesion")
 
 
+def test_only_the_last_step_is_printed_where_its_level_stands_twice(command, texts_drawn):
+    """As of an earthquake after the last level; results that do not change have no panel."""
+    words = "run", "dam", "--set", "n_joint=10", "--levels", "20,30,30", "--set", "k_h=0.05"
+    code, out, _ = command(*words, "--no-fields", "--sensitivity", "mu,rho_dam,E_found")
+    lines = out[out.index("Change by") :].splitlines()
+    assert code == 0 and [line[:7] for line in lines].count("rho_dam") == 1
+    assert len([line for line in lines if line.startswith("E_found")]) == 1
+    texts = {text for of_one in texts_drawn for text in of_one}
+    assert "change of crest_ux [mm]" in texts and "change of N [MN/m]" in texts
+    code, _, _ = command(*words, "--no-fields", "--sensitivity", "E_found")
+    assert code == 0 and "change of N [MN/m]" not in texts_drawn[-1]
+
+
 def rows_of(path):
     with path.open(newline="") as file:
         return list(csv.DictReader(file))

@@ -430,8 +430,9 @@ def draw_history(figure: AnyFigure, shown: list[Panel], result: Results) -> None
         for step, text in marks:
             place = level[step], lines[0][0][step] * factor
             axes.plot(*place, "o", color=RED, markersize=8, mfc="none", label="_changed")
-            away = {"xytext": (-7, 2), "textcoords": "offset points"}
-            axes.annotate(text, place, **away, ha="right", fontsize=7, color=RED)
+            away = {"xytext": (-7, -2), "textcoords": "offset points"}
+            # below the mark: above it the frame of the panel would cross the text
+            axes.annotate(text, place, **away, ha="right", va="top", fontsize=7, color=RED)
         if not high or axes is row[-1]:
             axes.set_xlabel("reservoir level [m]", fontsize=9)
         axes.set_ylabel(f"{quantity} [{name}]", fontsize=8.5)

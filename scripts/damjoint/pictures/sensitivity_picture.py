@@ -29,8 +29,10 @@ def draw(listed: Sequence[Mapping[str, Value]], title: str, path: Path) -> None:
 
 @picture_style()
 def figure(drawn: Sequence[Mapping[str, Value]], title: str) -> Figure:
-    """A panel for each result, a pair of bars for each parameter, the largest change on top."""
-    heads = [name for name in drawn[0] if name.endswith("]")]
+    """A panel for each result that changes, a pair of bars for each parameter, the largest change
+    on top.
+    """
+    heads = [n for n in drawn[0] if n.endswith("]") and any(cells[n] for cells in drawn)]
     width, height = 1.5 + PANEL * len(heads), 1.45 + BAR * len(drawn)
     picture = figure_of(width, height)
     text = "\n".join(wrap(title, int(14 * width)))

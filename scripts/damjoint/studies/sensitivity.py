@@ -405,7 +405,8 @@ def changes(
     deviations, by parameter; those listed are then these, with the change by one of them.
     """
     rows = [row for row in rows if not deviations or row.name in deviations]
-    last = [row for row in rows if row.level == rows[-1].level]
+    # of the last step alone: the last level may stand before it, too, as before an earthquake
+    last = [*{row.name: row for row in rows if row.level == rows[-1].level}.values()]
     if not last:
         return []
     by_name = deviations or {row.name: 0.01 * row.value or 1.0 for row in last}
