@@ -7,10 +7,12 @@ import damjoint as dj
 import numpy as np
 import pytest
 from closed_forms import WATER
-from damjoint.solver.derivatives import Side
+from damjoint.input.resolve import varied
+from damjoint.solver.derivatives import Side, half_difference
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.studies import sensitivity
 from damjoint.studies.critical import Search
+from damjoint_tools.random_scenes import random_scene
 from scipy.optimize import brentq
 
 SLIDES = {"law": "friction", "adhesion": 0.0, "pena_tang": 0.0, "n_joint": 40, "order": 1}
@@ -120,6 +122,63 @@ def test_the_results_of_a_run_against_central_differences(law, uplift):
             assert got == pytest.approx(expected, rel=EXACT, abs=allowed), (row.name, column)
 
 
+#: Half of a difference of runs over the value of a parameter, and change of the derivative beyond
+#: which this one is at a kink, or not smooth [-].
+STEP, SMOOTH = 2e-5, 1e-4
+
+
+def histories(case):
+    """Rows at the levels of a run, see `history`; None if it ends early."""
+    stepper = LoadStepper(case)
+    stepper.run()
+    model, saved = stepper.model, stepper.history.saved
+    rows = [sensitivity.values_of(Side(model, s, stepper.history.at_rest)) for s in saved]
+    return rows if len(rows) == len(case.levels) else None
+
+
+@pytest.mark.parametrize(
+    "numbers", [(0, 2, 3), pytest.param((6, 7, 9, 11, 12, 13, 15), marks=pytest.mark.heavy)]
+)
+def test_random_dams_against_central_differences(numbers):
+    """Of random laws, uplifts, lifts, loads and works; one of their parameters each, to 1e-6 of the
+    derivative, or of the result for a relative change of one; away from kinks.
+    """
+    compared = 0
+    for number in numbers:
+        case = varied(random_scene(5, number).case, {"n_joint": 4, "order": 1, "tolerance": 1e-13})
+        names = sensitivity.all_of(case)
+        name = names[np.random.default_rng(number).integers(len(names))]
+        value, _, high = half_difference(case, name)
+        step = STEP * abs(value) or 10 * (high - value)
+        try:
+            middle, *ends = (
+                histories(varied(case, {name: value + k * step})) for k in (0, -2, -1, 1, 2)
+            )
+            rows = sensitivity.of_run(case, [name]) if middle else []
+        except (dj.InputError, dj.RunError):  # beyond what is allowed; unstable growth
+            continue
+        if any(end is None for end in ends):
+            continue
+        for at, row in enumerate(rows):
+            for column in SIZES.keys() & row.derivatives.keys():
+                here, (far, low, high, top) = (
+                    middle[at][column],
+                    [end[at][column] for end in ends],
+                )
+                wide, narrow = (top - far) / (4 * step), (high - low) / (2 * step)
+                size = max(abs(here), SIZES[column] / 10) / (abs(value) or 1.0)
+                allowed = EXACT * max(abs(narrow), size)
+                bends = abs(wide - narrow), abs((high - here) / step - narrow)
+                rough = row.kink or max(bends) > SMOOTH * max(abs(narrow), size)
+                if rough or not np.isfinite(here):
+                    continue
+                expected = (4 * narrow - wide) / 3
+                got = row.derivatives[column]
+                assert got == pytest.approx(expected, rel=0, abs=allowed), (number, name, column)
+                compared += 1
+    assert compared >= 5 * len(numbers)
+
+
 def test_fifty_parameters_of_a_dam_with_lifts():
     """All forces are proportional to moduli, stiffnesses, strengths, energies and densities
     together, and displacements do not change with them [Euler's theorem].
@@ -212,6 +271,13 @@ def test_the_geometry_by_two_runs():
     last = history(case)
     assert of_mu.derivatives["SSF"] == pytest.approx(last["N"] / last["T"], rel=1e-6)
     assert abs(of_mu.derivatives["OSF"]) < 1e-9
+
+
+def test_a_run_beyond_the_limit_has_the_derivatives_of_its_last_equilibrium():
+    """Its time is not that of a step."""
+    case = dj.case("dam", levels=[30, 80], steps=1, law="friction", n_joint=6, order=1)
+    rows = sensitivity.of_run(case, ["mu"])
+    assert [row.level for row in rows] == [30, pytest.approx(history(case)["level"])]
 
 
 def test_the_factors_of_a_check(command, tmp_path):

@@ -197,16 +197,16 @@ def of_run(case: Case, names: Sequence[str]) -> list[Sensitivity]:
     with limited_threads(1):
         stepper = LoadStepper(replace(case, all_steps=True))
         stepper.run()
-        assert stepper.state.trace
-        updates = stepper.state.trace.updates
-        saved = [state.time for state in stepper.history.saved]
+        # the time of the last equilibrium below a limit is not that of its update
+        traces = [state.trace.updates for state in stepper.history.saved if state.trace]
+        updates, ends = traces[-1] if traces else [], [len(trace) - 1 for trace in traces]
         columns = list(with_all_joints(dict.fromkeys(CONTINUOUS, ("", "")), stepper.case))
         others = [name for name in names if is_of_geometry(stepper.case, name)]
         direct = [name for name in names if name not in others]
-        ends = [max(i for i, u in enumerate(updates) if u.state.time == time) for time in saved]
         rates, _ = Differentiation(stepper.model, direct).along(updates, ends, values_of_sides)
         # near a kink: also those for a larger value, which are others at a kink
-        near = [name for name, kink in zip(direct, rates[-1].kink, strict=True) if kink]
+        kinks = rates[-1].kink.tolist() if rates else []
+        near = [name for name, kink in zip(direct, kinks, strict=False) if kink]
         larger, _ = Differentiation(stepper.model, near, one_sided=True).along(
             updates if near else [], ends, values_of_sides
         )
