@@ -45,6 +45,18 @@ STIFF_BASE |= {
     "nu": 0.34,
 }
 
+#: Friction on a joint that is stiff for its mesh, with water that enters (random dam 74-85).
+STIFF_FRICTION = {"dam_height": 99.7, "dam_base": 95.1, "dam_crest": 18.3, "nu": 0.138, "mu": 1.06}
+STIFF_FRICTION |= {"E": 7.66e9, "E_found": 1.22e12, "K_N": 3.98e14, "K_T": 2.56e14, "sigma_max": 0}
+STIFF_FRICTION |= {
+    "law": "friction",
+    "adhesion": 0,
+    "uplift": "cracked",
+    "drains": 1,
+    "n_joint": 10,
+}
+STIFF_FRICTION |= {"drain_x": 11.8, "drain_effectiveness": 0.492, "drain_level": 17.3}
+
 
 @pytest.mark.parametrize("law", LAWS)
 def test_monotone_filling_does_not_depend_on_the_steps(solve, law):
@@ -172,3 +184,14 @@ def test_strength_that_a_step_has_destroyed_is_no_proof_of_sliding(solve):
     assert verdict(result) == "not converged"
     assert "shear strength" not in statement(result)
     assert any("a joint breaks at once" in hint for hint in hints(result))
+
+
+@pytest.mark.heavy
+def test_a_stiff_joint_with_friction_stands_with_any_number_of_steps(solve):
+    """With five steps it was "not converged" at 98.8 m: no strategy led from there to the last
+    level, nor, from the last state, to a higher one.
+    """
+    five, four = (solve("dam", "107", "0", steps, **STIFF_FRICTION)[0] for steps in (5, 4))
+    assert verdict(five) == verdict(four) == "stands"
+    for name in ("crest_ux", "N", "T"):
+        assert five.last[name] == pytest.approx(four.last[name], rel=1e-4)

@@ -256,7 +256,8 @@ class LoadStepper:
                 cuts += 1
                 dt = max(case.shared["cut"][0] * (time - self.state.time), case["smallest_step"])
                 if smallest:
-                    time, step = target, self.fallback_step(target)
+                    step = self.fallback_step(time, target)
+                    time = step.state.time if step else target
             if step:
                 dt = 2 * (time - self.state.time)
                 self.accept(step, cuts)
@@ -345,13 +346,24 @@ class LoadStepper:
         """
         return self.path_ended and (self.mechanism is not None or not smallest)
 
-    def fallback_step(self, target: float) -> StepResult | None:
-        """The whole step to a time by the last strategy, unless the dam has failed; else stop."""
-        step = None
+    def fallback_step(self, time: float, target: float) -> StepResult | None:
+        """The whole step to a target by the last strategy or, where it does not converge, the one
+        to a time by the last two, also from the extrapolation of the last states; else stop. None
+        if the dam has failed.
+        """
+        step, (*_, stiff, fallback) = None, self.model.strategies
         if self.mechanism is None:
-            control, fallback = self.control(target), self.model.strategies[-1:]
-            step = self.model.advance(self.state, target, control, StepOptions(fallback))
-            self.end_of_solution = "" if step else self.model.end_of_solution
+            step = self.model.advance(
+                self.state, target, self.control(target), StepOptions([fallback])
+            )
+            end = self.model.end_of_solution
+            for options in (
+                StepOptions([stiff], extrapolate=True),
+                StepOptions([fallback], extrapolate=True),
+                StepOptions([fallback]),
+            ):
+                step = step or self.model.advance(self.state, time, self.control(time), options)
+            self.end_of_solution = "" if step else end
             if step and self.leaps(step):
                 self.record_leap(self.state, step.state)
         self.stopped = step is None
