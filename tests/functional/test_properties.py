@@ -127,7 +127,7 @@ def in_units(case, units):
     }
     text = lambda heights: ",".join(repr(height * factor("m")) for height in heights)
     case = load("dam", values, text(case.levels), text(case.tail_levels))
-    columns = (JOINT | COLUMNS | FLUX | THICKNESS | HISTORY | OF_POINT | QUAKE).items()
+    columns = (QUAKE | JOINT | COLUMNS | FLUX | THICKNESS | HISTORY | OF_POINT).items()
     scaled = {name: partial(np.multiply, factor(unit)) for name, (unit, _) in columns}
     return case, scaled
 
