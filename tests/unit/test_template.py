@@ -20,6 +20,20 @@ def test_the_new_case_has_all_parameters_in_valid_statements(command, tmp_path):
     assert load("all.case").values == load("dam").values
 
 
+def test_all_examples_of_the_new_case_can_be_taken(command, tmp_path):
+    """Lifts with the block of one of them, and a polygonal face."""
+    command("new", "my.case")
+    text = (tmp_path / "my.case").read_text()
+    for start in ("lift_heights()", "downstream_face()", "Struct Joint::"):
+        assert text.count(f"// {start}") == 1
+        text = text.replace(f"// {start}", start)
+    (tmp_path / "taken.case").write_text(text)
+    case = load("taken.case")
+    assert [*case.joint_names] == ["base", "lift 15 m", "lift 30 m"]
+    assert [joint["law"] for joint in case.joints] == ["bond", "friction", "bond"]
+    assert case.downstream_face == (20, 20, 8, 38)
+
+
 def test_an_existing_file_is_not_overwritten(command, tmp_path):
     (tmp_path / "my.case").write_text("mine")
     for name, message in (("my.case", "must not exist"), ("my.txt", "must end in .case")):

@@ -23,11 +23,15 @@ tail_levels() = {{0, 0, 3}};
 // Corners of the downstream face between base and crest: x and height [m] of each, upwards.
 // downstream_face() = {{20, 20, 8, 38}};
 
-// Lift joints at these heights [m] above the base, and values that one of the joints base,
-// lift_15_m, lift_30_m has for itself; in all others it has the defaults.
+// Lift joints at these heights [m] above the base; the end of this file has values of one joint.
 // lift_heights() = {{15, 30}};
-// Struct Joint::lift_15_m [ law "friction", mu 1, adhesion 0.1*MPa ];
 """
+
+#: After the defaults, which must not follow a block that sets them.
+TAIL = """
+// Values that one of the joints base, lift_15_m, lift_30_m has for itself; in all others it has
+// the defaults.
+// Struct Joint::lift_15_m [ law "friction", mu 1, adhesion 0.1*MPa ];"""
 
 #: Parameters that differ from dam to dam.
 COMMON = (
@@ -61,7 +65,7 @@ def text(name: str, title: str) -> str:
             group = parameter.group
             lines.append(f"\n// {group}")
         lines.append(line(parameter, EXAMPLE.get(parameter.name, parameter.default)))
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, TAIL]) + "\n"
 
 
 def write(path: Path) -> None:
