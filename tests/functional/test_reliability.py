@@ -52,6 +52,7 @@ def trial():
     return dj.reliability(dj.case("dam", levels=[30, 36], **SLIDES), **VARIED, jobs=1)
 
 
+@pytest.mark.heavy
 def test_form_and_sorm_of_a_dam_that_slides(trial):
     """Beta of the closed form: least distance of its limit state; the probability of it by 2e7
     samples, 4.459e-3 +- 0.029e-3, of which FORM misses a fifth.
