@@ -129,11 +129,17 @@ def random_quake(seed: int, number: int, folder: Path) -> RandomQuake:
 
 
 def with_transient(scene: RandomQuake, rng: RandomNumbers) -> RandomQuake:
-    """A scene, some of those with flow with that of the water in time while the earthquake acts."""
+    """A scene, some of those with flow with that of the water in time while the earthquake acts,
+    and of these some with drains.
+    """
     waters = set(np.ravel(scene.settings["uplift"]))
     if not rng.event(0.5) or "flow" not in waters or "cracked" in waters:
         return scene
     drawn: Drawn = {"quake_uplift": "transient", "storage": rng.log_uniform(1e-13, 1e-10)}
+    if rng.event(0.5):
+        place = rng.uniform(0.05, 0.2) * scene.settings["dam_base"]
+        drawn |= {"drains": 1, "drain_x": float(f"{place:.3g}")}
+        drawn["drain_effectiveness"] = rng.uniform(0.2, 0.9)
     return replace(scene.changed(**drawn), checks=())
 
 

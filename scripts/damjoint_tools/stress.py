@@ -235,10 +235,23 @@ def verified(run: Witness) -> dict[str, object]:
     }
 
 
+def scene_of(seed: int, number: int, records: Path | None) -> RandomScene:
+    """Return a scene; records: as in `row_of`."""
+    return random_quake(seed, number, records) if records else random_scene(seed, number)
+
+
+def numbers_of(count: int, seed: int, records: Path | None, words: str) -> list[int]:
+    """Return the numbers of the first scenes of a seed whose command contains these words."""
+    if not words:
+        return list(range(count))
+    commands = ((n, " ".join(scene_of(seed, n, records).words)) for n in itertools.count())
+    return list(itertools.islice((n for n, command in commands if words in command), count))
+
+
 def row_of(seed: int, number: int, records: Path | None, parent: Path) -> dict[str, object]:
     """Return the row of a scene; records: folder of records; parent: of the folder of its runs."""
     tempfile.tempdir = str(parent)  # of all that this process writes, as it may be killed
-    scene = random_quake(seed, number, records) if records else random_scene(seed, number)
+    scene = scene_of(seed, number, records)
     with tempfile.TemporaryDirectory() as folder:
         row = run_and_verify(scene, Path(folder), twice=number % AGAIN == 0)
     return {"scene": name_of(seed, number)} | row
@@ -264,23 +277,31 @@ def stress(
     jobs: int | None = None,
     quake: bool = False,
     seeds: int = 1,
+    words: str = "",
 ) -> list[dict[str, str]]:
-    """Run those of the scenes 0 .. count - 1 of so many seeds, from a first one on, that are not in
+    """Run those of the first `count` scenes of so many seeds, from a first one on, that are not in
     the result file yet; returns the rows of all.
 
     out: CSV of COLUMNS; a row is written when its scene is finished. quake: earthquakes, with their
-    records in a folder beside the file. Raises InputError, also if the rows in the file were
-    computed by other code, or scikit-fem is missing.
+    records in a folder beside the file. words: of the commands of all these scenes. Raises
+    InputError, also if the rows in the file were computed by other code, or scikit-fem is missing.
     """
     if not find_spec("skfem"):
         raise InputError("stress: needs scikit-fem; install it by pip install 'damjoint[test]'")
     now = provenance()
-    scenes = list(itertools.product(range(seed, seed + seeds), range(count)))
-    about = {"stress": {"rows": len(scenes), "seed": seed, "seeds": seeds, "quake": quake}}
-    with rows_session("stress", out, COLUMNS, ("dim", "seconds"), about) as (study, done):
+    records = out.resolve().with_name(f"{out.stem}_records") if quake else None
+    scenes = [
+        (of, number)
+        for of in range(seed, seed + seeds)
+        for number in numbers_of(count, of, records, words)
+    ]
+    about = {"rows": len(scenes), "seed": seed, "seeds": seeds, "quake": quake, "with": words}
+    with rows_session("stress", out, COLUMNS, ("dim", "seconds"), {"stress": about}) as (
+        study,
+        done,
+    ):
         same_code(out, done.values(), now)
         missing = [scene for scene in scenes if name_of(*scene) not in done]
-        records = out.resolve().with_name(f"{out.stem}_records") if quake else None
         rows = rows_as_completed(missing, jobs or os.cpu_count() or 1, records)
         for row in track(rows, "stress", len(missing)):
             cells = row | now

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -177,7 +178,7 @@ def dam_section(rows: list[Row]) -> str:
         markdown(COMPARED, ("quantity", "is compared with", "to")),
         UNDECIDED_OR_NOT,
         "## Result",
-        classes(rows, "law", "uplift", "joints", "dim", "drive", with_words=IN_TIME),
+        classes(rows, "law", "uplift", "joints", "dim", "drive", with_words=FEATURES_OF_DAMS),
         "## Defects and undecided stops",
         unsolved(rows),
         "## The slowest scenes",
@@ -235,7 +236,7 @@ def quake_section(rows: list[Row]) -> str:
         "### And in a part of them, by further runs",
         QUAKES_BESIDE,
         "### Earthquakes: result",
-        classes(rows, "kind", "law", "uplift", "joints", "dim", with_words=FEATURES),
+        classes(rows, "kind", "law", "uplift", "joints", "dim", with_words=FEATURES_OF_QUAKES),
         measured(rows),
         "### Earthquakes: defects and undecided stops",
         unsolved(rows),
@@ -255,26 +256,32 @@ def seeds_of(rows: list[Row]) -> str:
 SLOWEST = "Seconds of the complete command, while other scenes run in parallel."
 
 
-#: What only a part of the earthquakes has, by a part of its command.
-FEATURES = {
+#: What only a part of the dams has, and of the earthquakes, by regular expressions of the command.
+FLOWS_WITH_DRAINS = r".* drains=(0,)*1"
+FEATURES_OF_DAMS = IN_TIME | {
+    "flow in time, with drains": rf"(?=.* time_unit=){FLOWS_WITH_DRAINS}",
+    "turbulent flow": "turbulent=1",
+}
+FEATURES_OF_QUAKES = {
     "rock with mass": "rock_mass=1",
     "dashpots in the joint": "joint_damping_n=",
     "damping by the mass": "damping_mass=",
     "published scheme": "time_integration=published",
     "flow in time": "quake_uplift=transient",
+    "flow in time, with drains": rf"(?=.* quake_uplift=transient){FLOWS_WITH_DRAINS}",
 }
 
 
 def classes(rows: list[Row], *names: str, with_words: dict[str, str] | None = None) -> str:
-    """Return the table of the scenes of each class, by columns and by parts of the command."""
+    """Return the table of the scenes of each class, by columns and features of the command."""
     lines: list[tuple[Any, ...]] = []
     for name in names:
         values = sorted({row[name] for row in rows if "," not in row[name]})
         for value in values:
             selected = [row for row in rows if row[name] == value]
             lines.append((f"{name} = {value}", *counts(selected).values()))
-    for words, part in (with_words or {}).items():
-        selected = [row for row in rows if part in row["command"]]
+    for words, feature in (with_words or {}).items():
+        selected = [row for row in rows if re.search(feature, row["command"])]
         lines.append((words, *counts(selected).values()))
     lines.append(("all", *counts(rows).values()))
     return markdown(lines, ("scenes", *CLASSES))

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -231,6 +232,27 @@ def test_scenes_have_all_that_is_drawn_and_can_be_loaded():
         kept = "dam_height", "dam_base", "E", "nu", "weight_first"
         if scene.base == "dam":
             assert all(scene.settings.get(n) == single.settings.get(n) for n in kept)
+
+
+def test_flow_in_time_is_selected_and_counted(tmp_path):
+    """`--with`: the first scenes of a seed that have it; a row of the page, another with drains."""
+    for words, records, features in (
+        ("time_unit=", None, trust.FEATURES_OF_DAMS),
+        ("quake_uplift=transient", tmp_path, trust.FEATURES_OF_QUAKES),
+    ):
+        scenes = [
+            [stress.scene_of(7, n, records).words for n in stress.numbers_of(3, 7, records, with_)]
+            for with_ in (words, "")
+        ]
+        chosen, first = ([" ".join(scene) for scene in drawn] for drawn in scenes)
+        assert len(chosen) == len(first) == 3 and all(words in command for command in chosen)
+        commands = {*chosen, *(command for command in first if words not in command)}
+        rows = [{"command": command, "class": stress.VERIFIED} for command in commands]
+        table = trust.classes(rows, with_words=features).splitlines()
+        counts = {row.split("|")[1].strip(): row.split("|")[2].strip() for row in table[2:]}
+        assert counts["flow in time"] == "3" and counts["all"] == str(len(rows)) != "3"
+        with_drains = [c for c in chosen if re.search(r"drains=[0,]*1", c)]
+        assert counts["flow in time, with drains"] == str(len(with_drains))
 
 
 def test_stress_is_reproducible_and_resumed_and_makes_a_page(command, monkeypatch):

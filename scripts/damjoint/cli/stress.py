@@ -22,6 +22,13 @@ def add(command: Parser) -> None:
     )
     command.add_argument("--quake", action="store_true", help="random earthquakes instead")
     command.add_argument(
+        "--with",
+        dest="words",
+        metavar="WORDS",
+        default="",
+        help="only those whose command contains these words, such as time_unit= (default: all)",
+    )
+    command.add_argument(
         "--mutate",
         action="store_true",
         help="instead put errors into copies of the package, one by one, and look in which random "
@@ -39,7 +46,7 @@ def call(arguments: argparse.Namespace) -> int:
         return mutate(arguments)
     stress = tool("stress")
     options = arguments.seed, arguments.out, arguments.jobs, arguments.quake, arguments.seeds
-    rows = stress.stress(arguments.count, *options)
+    rows = stress.stress(arguments.count, *options, arguments.words)
     for row in rows:
         if row["class"] == stress.DEFECT:
             print(f"{row['scene']}: {row['findings']}\n  {row['command']}")

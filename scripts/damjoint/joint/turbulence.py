@@ -16,8 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Array
-from .flow import FlowSolution
+from ..arrays import Array, BoolArray
+from .flow import FlowSolution, FlowSystem
 
 #: Reynolds number at which the two friction factors are equal [-].
 CRITICAL = (96 / 0.316) ** (4 / 3)
@@ -64,15 +64,28 @@ def turbulent_flow(
         if not np.isfinite(change).all():
             break
         if np.abs(change).max() < TOLERANCE:
-            tangent = np.where(new < 1, EXPONENT * share, 1)
-            assert system.inverse_of
-            inverse = system.inverse_of(conductivity * share, conductivity * tangent)
-            system = replace(system, inverse=inverse, slowed=tangent)
+            if (new < 1).any():
+                system = with_tangent(system, conductivity, share, new < 1)
             return replace(solution, systems=[system]), share
         before = [*before[-DEPTH:], (log, change)]
         log = np.minimum(extrapolated(before), 0)
     nothing = np.full(len(solution.pressure), np.nan)
     return replace(solution, pressure=nothing, systems=[]), np.ones(len(log))
+
+
+def with_tangent(
+    system: FlowSystem, conductivity: Array, share: Array, turbulent: BoolArray
+) -> FlowSystem:
+    """The system with the derivatives of flow that is turbulent at some points (q,), see
+    `turbulent_flow`; their matrix is computed only where a tangent is.
+    """
+    tangent, inverse_of = np.where(turbulent, EXPONENT * share, 1), system.inverse_of
+    assert inverse_of
+
+    def inverse(coupling: Array) -> Array:
+        return inverse_of(conductivity * share, conductivity * tangent)(coupling)
+
+    return replace(system, inverse=inverse, slowed=tangent)
 
 
 def extrapolated(before: list[tuple[Array, Array]]) -> Array:
