@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -370,6 +371,8 @@ class WaterSystem:
         self.last_voids: dict[tuple[int, int], Array] = {}
         #: likewise: by how much turbulence slows the last flow
         self.last_slowed: dict[tuple[int, int], Array] = {}
+        #: the last solution in 2D, and of what: at the end of a step it is needed again
+        self.last_solution: tuple[Array, tuple[Any, ...], FlowSolution] | None = None
         #: of the last loadings, see `_heads`
         self.heads = lru_cache(maxsize=4)(self._heads)
 
@@ -443,6 +446,25 @@ class WaterSystem:
         drains ends their effect (EM 1110-2-2200): e falls to zero while it grows through the
         elements beside them, in which all the head between it and the drains is lost meanwhile.
         """
+        given = variables, loading, before_quake, step, effect
+        if self.last_solution:
+            at, of, solution = self.last_solution
+            if all(map(operator.is_, of, given)) and np.array_equal(at, jump):
+                return solution
+        solution = self._solve(jump, *given)
+        if self.flow.dim == 2:
+            self.last_solution = jump.copy(), given, solution
+        return solution
+
+    def _solve(
+        self,
+        jump: Array,
+        variables: JointVariables,
+        loading: Loading,
+        before_quake: BeforeQuake | None,
+        step: TimeStep | None,
+        effect: float | None,
+    ) -> FlowSolution:
         opened = [water.opened(jump, variables, before_quake) for water in self.members]
         factors = [
             water.conductivity(*at)[0] for water, at in zip(self.members, opened, strict=True)
