@@ -408,8 +408,9 @@ def violations(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
     worst: dict[int, tuple[float, float]] = {}
     masses = dict[int, str]()
     updates, room = updates_of(asked, steps), DIGITS if asked.joints[0]["dim"] == 2 else IN_3D
-    rows = rows_of_updates(files, steps)
+    rows = dict[float, int]()
     for wet in replayed(files, asked, steps):
+        rows = rows or rows_of_updates(files, steps)
         found = written(wet.network, [of[wet.number] for of in updates])
         row = rows.get(float(updates[0][wet.number]["update"][0]))
         for k, joint in enumerate(wet.network.joints):
