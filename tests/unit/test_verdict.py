@@ -130,6 +130,16 @@ def test_the_statement_gives_the_mechanism_found_on_the_path():
     assert "followed to 4.2 times that displacement, reaches 2.5 m at most" in statement
 
 
+def test_a_statement_after_unstable_crack_growth_names_its_lowest_level():
+    """The strength that is left there depends on the steps, and so does the level of the stop."""
+    result = stopped("bond")
+    holds = result.case["mu"] * N + result.case["adhesion"] * result.case.joint_along
+    result.history["T"] += holds
+    result.info["unstable_growth"] = (1.75, 1.5)
+    where = "no equilibrium beyond level 2 m (t = 0.5), after unstable crack growth at level 1.5 m"
+    assert f"sliding: {where}: T = " in statement_of(result)
+
+
 @pytest.mark.parametrize(
     "names", [("b10", "b1", "b1 and b"), ("b1", "b10", "b"), ("b", "b 1", "b1")]
 )

@@ -62,9 +62,13 @@ def reason_at_first(results: Results, mode: str) -> str:
 
 
 def reason_of_stop(results: Results) -> str:
-    """The mechanism or bound of statics at which a run has stopped, or that there is none."""
+    """The mechanism or bound of statics at which a run has stopped, or that there is none. The state
+    after unstable crack growth, and so its strength, depends on steps and mesh.
+    """
     case, last, shown = results.case, results.last, results.info.get("mechanism")
     where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
+    if grown := results.info.get("unstable_growth"):
+        where += f", after unstable crack growth at level {min(grown):.6g} m"
     if shown:
         ratio = shown["displacement_ratio"]
         along = f", followed to {ratio:.2g} times that displacement," if ratio > 1 else ""
