@@ -62,8 +62,8 @@ def reason_at_first(results: Results, mode: str) -> str:
 
 
 def reason_of_stop(results: Results) -> str:
-    """The mechanism or bound of statics at which a run has stopped, or that there is none. The state
-    after unstable crack growth, and so its strength, depends on steps and mesh.
+    """The mechanism or bound of statics at which a run has stopped, or that there is none. The
+    state after unstable crack growth, and so its strength, depends on steps and mesh.
     """
     case, last, shown = results.case, results.last, results.info.get("mechanism")
     where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
