@@ -32,7 +32,7 @@ from ..session import end_of, preparation
 from ..solver.controls import LevelControl
 from ..solver.history import JointState
 from ..solver.load_stepper import LoadStepper
-from ..solver.model import Model, StepResult
+from ..solver.model import Model, StepOptions, StepResult
 from ..solver.state import State, Trace
 from ..solver.trace_table import trace_table
 from ..statics.statement import statement
@@ -237,8 +237,15 @@ class QuakeRun:
 
 
 def static_step(model: Model, end: State) -> StepResult | None:
-    """The step from the end of an earthquake to the static equilibrium under the last loads."""
-    return model.advance(replace(end, stored=()), end.time, LevelControl(end.loading.level))
+    """The step from the end of an earthquake to the static equilibrium under the last loads; also
+    from closed joints where they are open throughout, so that no contact guides Newton's method.
+    """
+    end, control = replace(end, stored=()), LevelControl(end.loading.level)
+    found, interface = model.advance(end, end.time, control), model.equilibrium.interface
+    if found or (interface.jumps(interface.at_points, end.jump)[:, 0] <= 0).any():
+        return found
+    closed = StepOptions(guess=(np.zeros_like(end.jump), end.loading.level))
+    return model.advance(end, end.time, control, closed)
 
 
 def outcome_of(case: Case) -> tuple[LoadStepper, dict[str, Any]]:
