@@ -34,9 +34,12 @@ def test_the_command_prints_a_row_for_each_joint_and_what_is_refused(command):
     """With a tenth of K_T the joint of friction stores more than G_t before it softens."""
     lifts = "--set", "lift_heights=20", "--set", "K_T=1e9", "--set", "G_t=100"
     words = "run", "dam", *WORDS, *lifts, "--levels", "30", "--no-picture", "--no-fields"
-    code, out, _ = command(*words, "--sensitivity", "K_T")
+    code, out, _ = command(*words, "--sensitivity", "K_T", "--wide")
     assert code == 0 and "K_N of joint base: the weight closes the joint by" in out
     assert sum(line.startswith("K_T x 10") for line in out.splitlines()) == 2
+    _, out, _ = command(*words, "--sensitivity", "K_T")
+    assert sum(line.startswith("K_T x 10") for line in out.splitlines()) == 1
+    assert "(lift 20 m: no change but of the tangential jump; rows with --wide)" in out
     assert "K_T / 10: G_t = 100: must be > 200 N/m" in out
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
+from textwrap import wrap
 
 import numpy as np
 
@@ -105,13 +106,38 @@ def table(runs: Sequence[tuple[str, Results | str]]) -> tuple[Table, list[str]]:
 
 #: Columns that a narrow table leaves out, in this order.
 LESS = ("level", "slipped", "tangential jump")
+#: Columns that do not tell whether a joint's state changes: the crest's movement and the verdict
+#: are of the dam, the tangential jump of a joint that holds is elastic, T/K_T.
+NOT_OF_STATE = ("run", "tangential jump", "crest movement", "verdict")
+
+
+def unchanged(cells: Table) -> list[str]:
+    """Joints whose state is the same in all runs to the printed digits; one joint is left for the
+    dam's values, the first.
+    """
+    if "joint" not in cells.names:
+        return []
+    joint = cells.names.index("joint")
+    picked = [k for k, name in enumerate(cells.names) if name not in NOT_OF_STATE]
+    states = {row[joint]: set[tuple[str, ...]]() for row in cells.rows}
+    for row in cells.rows:
+        states[row[joint]].add(tuple(row[k] for k in picked))
+    _, *others = states
+    return [name for name in others if len(states[name]) == 1]
 
 
 def lines(runs: Sequence[tuple[str, Results | str]], width: int | None = None) -> list[str]:
-    """The table as text, and the messages; width: of the terminal, None: all columns."""
+    """The table as text, and the messages; width: of the terminal, None: all columns and joints."""
     cells, messages = table(runs)
+    less = [] if width is None else unchanged(cells)
+    rows = [row for row in cells.rows if not set(row[1:2]) & set(less)]
     draw = partial(aligned, left=2 if "joint" in cells.names else 1)
-    return [fitted(cells.names, cells.stacked, cells.rows, LESS, width, draw), *messages]
+    text = [fitted(cells.names, cells.stacked, rows, LESS, width, draw)]
+    if less and width is not None:
+        text += wrap(
+            f"({', '.join(less)}: no change but of the tangential jump; rows with --wide)", width
+        )
+    return [*text, *messages]
 
 
 def state_of(result: Results) -> dict[str, float]:
