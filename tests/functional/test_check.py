@@ -13,6 +13,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from blocks import write_blocks
+from damjoint import cli
 from damjoint.pictures import check_picture
 from damjoint.pictures.check_picture import draw_check, draw_joint
 from damjoint.post import folder as folders
@@ -658,3 +659,11 @@ def test_a_joint_that_others_hold_may_slip_along_its_full_length(tmp_path):
     b1 = checks["b1"].finite_elements
     assert 0.9 < b1.numbers["SSF"] < 1 and b1.verdict == UNCHECKED and not b1.failures
     assert checks["b10"].finite_elements.numbers["SSF"] > 3
+
+
+def test_factors_by_friction_are_named_where_the_law_has_none(tmp_path, capsys):
+    """Law mixed has neither mu nor adhesion, and so no factor of its own."""
+    settings = (f"--set={value}" for value in ("law=mixed", "n_joint=10", "order=1"))
+    assert cli.main(["check", "dam", "--levels=20", *settings, f"--out={tmp_path}"]) == 0
+    strength = "SSF with mu = 0.8, adhesion = 200000 Pa, which the law mixed does not have"
+    assert strength in capsys.readouterr().out

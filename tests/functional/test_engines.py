@@ -184,6 +184,8 @@ STAGED |= {"anchor_angle": 10.0, "k_h": 0.1, "k_v": 0.05, "floor_water": 1.0, "f
 STEEP = {"batter": 5.0, "batter_height": 35.0}
 HEAVY_SILT = {"silt_height": 12.0, "silt_weight": 1.0, "k_h": 0.1, "added_mass": 2.0}
 WARM = {"temperature_dam": -8.0, "temperature_linear": 15.0, "temperature_found": 3.0}
+#: Strong enough not to lose much in a step, which the condensed engine alone tries again by shorter
+YEAR = {"temperature_period": 3.0, "joint_slope": -4.0, "adhesion": 1e6}
 #: Within an element of a lift joint
 STOPPED = {"joint_height": 20.0, "uplift": "waterstop", "waterstop": 5.2, "sigma_max": 2e4}
 SOLID = {"dim": 3.0, "thickness": 3.0, "n_layers": 2.0, "mesh_pattern": "split", "n_joint": 10.0}
@@ -217,7 +219,7 @@ SECTIONS = {
     "solid": (SOLID | SHAPE | {"joint_slope": 4.0, "silt_height": 12.0, "k_h": 0.1}, "20,41", "0"),
     "temperature": (SHAPE | WARM | {"joint_slope": 3.0, "k_h": 0.05}, "20,41", "0"),
     "temperature, lift": (WARM | {"joint_height": 10.0, "law": "bond", "order": 1.0}, "20,41", "0"),
-    "a year": (WARM | {"temperature_period": 3.0, "joint_slope": -4.0}, "30,44,40", "2"),
+    "a year": (WARM | YEAR, "30,44,40", "2"),
     "temperature, quadrangles": (WARM | {"mesh_pattern": "regular"}, "30,44", "2"),
     "temperature driven": (WARM | {"drive": "crest", "drive_by": 1e-3}, "20,40", "0"),
     "temperature, solid": (SOLID | SHAPE | WARM, "20,41", "0"),

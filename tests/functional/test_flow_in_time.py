@@ -1,5 +1,6 @@
 """Flow in time: closed forms, mass balance, cavitation, steady limit."""
 
+from dataclasses import replace
 from math import erfc
 
 import numpy as np
@@ -395,13 +396,14 @@ def test_a_step_of_a_film_may_have_two_equilibria():
 @pytest.mark.heavy
 def test_a_film_without_compressibility_in_steps_of_milliseconds():
     """A point that has just opened by 3 nm between closed ones changes the pressure by 1e18 Pa/m:
-    the iterates go to and fro between full film and void, 1e-13 m apart. The compressibility of
-    the water itself is enough, and the hint on the stopped run has it.
+    the iterates go to and fro between full film and void, 1e-13 m apart, and steps are cut. The
+    compressibility of the water itself is enough; the hint on a run that stops there has it.
     """
     settings = {"time_unit": 0.01, "joint_slope": 3.0}
-    stopped = dam((30.0, 44.0, 20.0), **settings).run()
-    (hint,) = (text for text in hints(stopped) if "storage" in text)
-    assert stopped.stopped and hint.endswith("storage = 4.5e-15")
+    cut = dam((30.0, 44.0, 20.0), **settings).run()
+    assert not cut.stopped and cut.history["cuts"].any()
+    (hint,) = (text for text in hints(replace(cut, stopped=True)) if "storage" in text)
+    assert hint.endswith("storage = 4.5e-15")
     run = dam((30.0, 44.0, 20.0), storage=float(hint.split()[-1]), **settings).run()
     assert not run.stopped and not run.history["cuts"].any()
 

@@ -53,7 +53,7 @@ class Law(Generic[V]):
     softens = False
     #: whether the state under rising water depends on the steps that lead to it
     path_dependent = True
-    #: whether its shear stress is bounded, so that a dam can slide
+    #: whether friction and cohesion, mu and adhesion, bound its shear stress: it has a SSF
     limits_shear = True
     #: parameter of its hardening modulus [Pa/m]; empty: it does not harden
     hardening_parameter = ""

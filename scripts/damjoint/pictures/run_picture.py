@@ -202,7 +202,7 @@ def facts_of(result: Results) -> list[str]:
 def shear_limit(case: Case, rows: dict[str, np.ndarray]) -> tuple[str, np.ndarray] | None:
     """The joint's shear strength at each row [Pa], and its formula; None if it has none."""
     law = case.law
-    if not law.limits_shear:
+    if not law.shear_strength_formula:
         return None
     hardening = " + H slip" if law.hardening_parameter and case.hardening_requested else ""
     strength = law.shear_strength(rows["sigma_n_eff"], rows["damage"], rows["slip"])

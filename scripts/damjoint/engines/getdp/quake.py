@@ -150,7 +150,7 @@ def read_rows(case: Case, folder: Path) -> Table:
         for name in FROM_STATIC:
             of_joint[name] = of_joint[name] - of_joint[name][:1]
         of_joint["slip_mean"] /= joint.joint_length
-        strength = of_joint["shear_reserve"] if joint.law.limits_shear else np.inf
+        strength = of_joint["shear_reserve"] if joint.law.shear_strength_formula else np.inf
         of_joint["shear_reserve"] = strength - np.abs(of_joint["T"])
         rows |= {column_of(name, k): values for name, values in of_joint.items()}
     return {name: rows[name][1:] for name in quake_columns(case) if name in rows}
