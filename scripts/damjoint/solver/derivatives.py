@@ -321,9 +321,9 @@ class Differentiation:
             n in LOADING or parameter(n).group == "Loads"
             for n in (m.rpartition(".")[2] for m in names)
         ]
-        #: on each side, the low ones before the high ones: model, and the parameter beyond its
-        #: value; of each parameter the distance of its sides
-        self.models, beyond = list[Model](), list[float]()
+        #: on each side, the low ones before the high ones: model, and the offset of the parameter
+        #: from its value; of each parameter the distance of its sides
+        self.models, offsets = list[Model](), list[float]()
         ends = [half_difference(model.case, name) for name in names]
         middle = [(low + high) / 2 for _, low, high in ends]
         if one_sided:
@@ -338,8 +338,8 @@ class Differentiation:
         for side in (1, 2):
             for name, end in zip(names, ends, strict=True):
                 self.models.append(self.model_with(name, end[side]))
-                beyond.append(end[side] - middle[len(beyond) % len(names)])
-        self.beyond = np.array(beyond)
+                offsets.append(end[side] - middle[len(offsets) % len(names)])
+        self.offsets = np.array(offsets)
         self.number, self.distance = len(ends), np.array([high - low for _, low, high in ends])
         start = model.start()
         #: of the sides, if each is evaluated apart; displacement of the crest from which it counts
@@ -510,7 +510,7 @@ class SidesInStep:
         self.rate = np.zeros((sides.number, len(self.end.jump)))
         self.level_rate = np.zeros(sides.number)
         #: of the sides: tangents of the laws where they have last been evaluated
-        self.tangents = np.zeros((len(sides.beyond), *self.linear.tangent.law.shape))
+        self.tangents = np.zeros((len(sides.offsets), *self.linear.tangent.law.shape))
         #: of the sides: their steps, if each is evaluated apart
         self.begun = list[Begun]()
         if sides.apart:
@@ -524,10 +524,10 @@ class SidesInStep:
 
     def move(self) -> None:
         """Move the sides by the rates."""
-        beyond = self.sides.beyond
+        offsets = self.sides.offsets
         #: the jumps (sides, j); what is unknown beside them (sides,), less that of the end
-        self.jumps = self.end.jump + beyond[:, None] * np.tile(self.rate, (2, 1))
-        self.shifts = beyond * np.tile(self.level_rate, 2)
+        self.jumps = self.end.jump + offsets[:, None] * np.tile(self.rate, (2, 1))
+        self.shifts = offsets * np.tile(self.level_rate, 2)
 
     @cached_property
     def loadings(self) -> list[Loading]:
@@ -545,7 +545,7 @@ class SidesInStep:
     def at(self, matrix: CsrMatrix) -> Array:
         """The jumps (sides, q, 3) at points, by `at_points` or `at_nodes` of the interface."""
         dim = self.sides.model.equilibrium.interface.dim
-        jumps = np.zeros((len(self.sides.beyond), matrix.shape[0] // dim, 3))
+        jumps = np.zeros((len(self.sides.offsets), matrix.shape[0] // dim, 3))
         jumps[:, :, :dim] = matrix.on_rows(self.jumps).reshape(len(jumps), -1, dim)
         return jumps
 
@@ -661,7 +661,7 @@ class SidesInStep:
             if correction < 2:
                 change, level_change = self.linear.solve(rights, self.gaps()[some])
             else:
-                change, level_change = self.by_own_tangents(some, rights)
+                change, level_change = self.by_tangents_of_sides(some, rights)
             self.rate[some] += change.T
             self.level_rate[some] += level_change
             self.move()
@@ -677,7 +677,7 @@ class SidesInStep:
         if number:
             sides.lost[lost] = True
 
-    def by_own_tangents(self, some: IntArray, rights: Array) -> tuple[Array, Array]:
+    def by_tangents_of_sides(self, some: IntArray, rights: Array) -> tuple[Array, Array]:
         """The corrections of some rates, each with the tangents of its sides: their mean, weighted
         by how far the sides are from the state.
         """
@@ -685,7 +685,7 @@ class SidesInStep:
         columns = []
         for k, right in zip(some.tolist(), rights.T, strict=True):
             pair = [k, k + number]
-            weights = np.abs(self.sides.beyond[pair]) / np.abs(self.sides.beyond[pair]).sum()
+            weights = np.abs(self.sides.offsets[pair]) / np.abs(self.sides.offsets[pair]).sum()
             of = replace(tangent, law=np.tensordot(weights, self.tangents[pair], 1))
             linear = replace(self.linear, tangent=of)
             columns.append(linear.solve(right[:, None], gaps[[k]]))
@@ -719,7 +719,7 @@ class SidesInStep:
             for alike in joint:
                 alike.finish(at_points[alike.sides, of_points], at_nodes[alike.sides, of_nodes])
         if sides.apart:
-            sides.states = [self.state(k) for k in range(len(sides.beyond))]
+            sides.states = [self.state(k) for k in range(len(sides.offsets))]
 
     @property
     def joints(self) -> list[tuple[tuple[slice, list[Alike]], tuple[slice, list[Alike]]]]:
@@ -764,7 +764,7 @@ class SidesInStep:
             return [state.pressures[joint] for state in sides.states]
         assert self.problem.water
         water, variables, result = base.water[joint], self.problem.water.variables, []
-        nodal: Sequence[Array | None] = [None] * len(sides.beyond)
+        nodal: Sequence[Array | None] = [None] * len(sides.offsets)
         if water.system in base.flowing and not self.control:
             nodal = list(self.nodal[base.flowing.index(water.system)][:, water.nodes])
         for side, (model, jump) in enumerate(zip(sides.models, self.jumps, strict=True)):
@@ -780,7 +780,7 @@ class SidesInStep:
         """Time and level, the columns of history.csv that follow the parameters continuously, and
         of each joint `crack_end`.
         """
-        interface, number = self.sides.model.equilibrium.interface, len(self.sides.beyond)
+        interface, number = self.sides.model.equilibrium.interface, len(self.sides.offsets)
         at_points, at_nodes = (self.at(m) for m in (interface.at_points, interface.at_nodes))
         row = {
             "time": np.full(number, self.end.time),

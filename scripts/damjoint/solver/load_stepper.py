@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import asdict, dataclass, replace
 from typing import cast
@@ -292,21 +292,18 @@ class LoadStepper:
         the joint breaks at once, `leapt`.
         """
         other, end, smallest = self.fork(self.case), whole.state.time, self.case["smallest_step"]
-        step: StepResult | None = whole
-        dt = end - self.state.time
-        while step is None or other.leaps(step) or step.state.time < end:
-            if step is None or other.leaps(step):
-                if dt < smallest * (1 + SAME_TIME):
-                    self.record_leap(other.state, whole.state)
-                    return False
-                dt *= self.case.shared["cut"][0]
-            else:
-                other.accept(step, cuts=0)
-                dt *= 2
+        dt, accepted = end - self.state.time, False  # of the whole step
+        while other.state.time < end:
+            if not accepted and dt < smallest * (1 + SAME_TIME):
+                self.record_leap(other.state, whole.state)
+                return False
+            dt *= 2 if accepted else self.case.shared["cut"][0]
             time = min(other.state.time + max(dt, smallest), end)
             dt = time - other.state.time
             step = other.direct_step(time, dt < smallest * (1 + SAME_TIME))
-        other.accept(step, cuts=0)
+            accepted = bool(step and not other.leaps(step))
+            if step and accepted:
+                other.accept(step, cuts=0)
         if self.model.damage_between(other.state, whole.state) <= SAME_DAMAGE:
             return False
         self.state, self.history = other.state, other.history
@@ -498,6 +495,14 @@ class LoadStepper:
             reached = replace(top.state, time=time)
             self.accept(StepResult(reached, spent, top.last["residual"]), cuts=0)
             self.record_limit_points([point.level for point in path.points[: path.limit_point + 1]])
+
+    @property
+    def saved_updates(self) -> tuple[Sequence[Trace], list[int]]:
+        """The updates that lead to the last saved state of a run with `all_steps`, and the numbers
+        of those that end at the saved ones, whose times may be others: below a limit.
+        """
+        traces = [state.trace.updates for state in self.history.saved if state.trace]
+        return (traces[-1] if traces else []), [len(trace) - 1 for trace in traces]
 
     def results(self) -> Results:
         """All tables so far, and what is known of failure and unstable crack growth."""

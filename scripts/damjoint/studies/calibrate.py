@@ -410,20 +410,17 @@ class Fit:
     def exact(self, x: Array) -> Array:
         """Those by direct differentiation; nan where there is none."""
         slopes = np.full((len(self.weighted(x, self.computed(x))), len(self.free)), np.nan)
-        priors = np.diag([f.residual_slope(v) if f.prior else 0.0 for f, v in self.at_each(x)])
         some = [k for k, one in enumerate(self.free) if has_derivative(self.case, one.name)]
+        at_each = list(zip(self.free, x.tolist(), strict=True))
+        priors = np.diag([f.residual_slope(v) if f.prior else 0.0 for f, v in at_each])
         with limited_threads(1), contextlib.suppress(InputError, RunError, np.linalg.LinAlgError):
             assert self.stepper
             rates = self.measurements.rates_of_run(self.stepper, [self.free[k].name for k in some])
-            scales = np.array([one.slope(v) for one, v in self.at_each(x)])[some]
+            scales = np.array([f.slope(v) for f, v in at_each])[some]
             weighted = (rates / self.deviation[:, :, None])[self.read] * scales
             of_priors = priors[[f.prior is not None for f in self.free]]
             slopes[:, some] = np.vstack([weighted, of_priors[:, some]])
         return slopes
-
-    def at_each(self, x: Array) -> list[tuple[Free, float]]:
-        """The free parameters and their scaled values."""
-        return list(zip(self.free, x.tolist(), strict=True))
 
     def by_differences(self, x: Array, numbers: Sequence[int], central: bool) -> Array:
         """Those with parameters of some numbers, one step away from a limit."""

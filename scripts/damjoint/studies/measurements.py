@@ -117,10 +117,7 @@ class Measurements:
 
         Raises InputError, and RunError if a state has none.
         """
-        assert stepper.state.trace
-        updates = stepper.state.trace.updates
-        last = {update.state.time: number for number, update in enumerate(updates)}
-        ends = [last[time] for time in self.times.tolist()]
+        updates, ends = stepper.saved_updates
 
         def values(step: SidesInStep) -> dict[str, Array]:
             row = step.row() if any(one.position is None for one in self.series) else {}

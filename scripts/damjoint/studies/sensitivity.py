@@ -60,7 +60,7 @@ ROUNDING = 1e-9
 
 #: Difference of derivatives to one and to both sides, over them, beyond which there is a kink [-],
 #: and that of results by a relative change of one, over them, up to which it is round-off [-].
-ONE_SIDED, ROUND_OFF = 1e-3, 1e-5
+ONE_SIDED, NOISE = 1e-3, 1e-5
 
 #: Rise of the level with the displacement, over its mean on the path [-], up to which a point
 #: counts as a limit point, whose level has a derivative: 5e-6 where a dam slides; 5e-4 gives 2 % of
@@ -197,9 +197,7 @@ def of_run(case: Case, names: Sequence[str]) -> list[Sensitivity]:
     with limited_threads(1):
         stepper = LoadStepper(replace(case, all_steps=True))
         stepper.run()
-        # the time of the last equilibrium below a limit is not that of its update
-        traces = [state.trace.updates for state in stepper.history.saved if state.trace]
-        updates, ends = traces[-1] if traces else [], [len(trace) - 1 for trace in traces]
+        updates, ends = stepper.saved_updates
         columns = list(with_all_joints(dict.fromkeys(CONTINUOUS, ("", "")), stepper.case))
         others = [name for name in names if is_of_geometry(stepper.case, name)]
         direct = [name for name in names if name not in others]
@@ -220,7 +218,7 @@ def of_run(case: Case, names: Sequence[str]) -> list[Sensitivity]:
                 row, kink = row_at(of, k, columns), False
                 if of.kink[k]:
                     other = row_at(larger[number], near.index(name), columns)
-                    noise = {c: ROUND_OFF * abs(sizes[c] / (value or 1)) for c in columns}
+                    noise = {c: NOISE * abs(sizes[c] / (value or 1)) for c in columns}
                     kink = differ(row, other, noise)
                     row = other if kink else row
                 if row:
