@@ -195,3 +195,15 @@ def test_a_stiff_joint_with_friction_stands_with_any_number_of_steps(solve):
     assert verdict(five) == verdict(four) == "stands"
     for name in ("crest_ux", "N", "T"):
         assert five.last[name] == pytest.approx(four.last[name], rel=1e-4)
+
+
+@pytest.mark.heavy
+def test_a_path_lost_from_an_earlier_state_is_followed_from_the_last_one(solve):
+    """With three steps it was "not converged", 2e-5 below the limit point: the path from 40.67 m
+    had led to another branch.
+    """
+    stiff = {"K_N": 1e12, "K_T": 4e12, "sigma_max": 8e5, "G_f": 100, "dam_base": 26}
+    stiff |= {"law": "mixed", "uplift": "none", "n_joint": 20}
+    (result,) = solve("dam", "38,42", None, 3, **stiff)
+    assert verdict(result) == "sliding"
+    assert result.last["level"] == pytest.approx(40.910, abs=0.001)

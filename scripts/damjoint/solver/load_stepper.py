@@ -70,6 +70,8 @@ class LoadStepper:
         self.end_of_solution = ""
         #: whether an equilibrium path has been followed to its end
         self.path_ended = False
+        #: the state from which the last one was followed
+        self.path_begin: State | None = None
         #: how the dam fails, once its equilibrium path has shown that it does
         self.mechanism: Mechanism | None = None
         #: whether the weight alone, which is to act first, has not converged
@@ -345,8 +347,9 @@ class LoadStepper:
 
     def fallback_step(self, time: float, target: float) -> StepResult | None:
         """The whole step to a target by the last strategy or, where it does not converge, the one
-        to a time by the last two, also from the extrapolation of the last states; else stop. None
-        if the dam has failed.
+        to a time by the last two, also from the extrapolation of the last states; or along the
+        equilibrium path, if one from an earlier state was lost; else stop. None if the dam has
+        failed.
         """
         step, (*_, stiff, fallback) = None, self.model.strategies
         if self.mechanism is None:
@@ -360,7 +363,9 @@ class LoadStepper:
                 StepOptions([fallback]),
             ):
                 step = step or self.model.advance(self.state, time, self.control(time), options)
-            self.end_of_solution = "" if step else end
+            if step is None and self.path_ended and self.state is not self.path_begin:
+                step = self.along_path(target)
+            self.end_of_solution = "" if step or self.mechanism else end
             if step and self.leaps(step):
                 self.record_leap(self.state, step.state)
         self.stopped = step is None
@@ -401,6 +406,7 @@ class LoadStepper:
         begin, level = self.state, self.case.level_at(time)
         if begin.time == 0 or level < begin.loading.level:
             return None
+        self.path_begin = begin
         path = EquilibriumPath([Point(self.model, begin, self.history.copy())], time)
         same = self.same_but_for_level(self.model.loading(time, level), begin.loading)
         start = path.points[0]
