@@ -404,6 +404,12 @@ def test_bad_input_is_refused(command, tmp_path, words, message):
     assert not list(tmp_path.iterdir())
 
 
+def test_values_that_a_law_ties_to_others_are_refused(command, tmp_path):
+    code, _, err = command("critical", "dam", "--of", "mu", "--set", "law=endo")
+    assert code == 2 and "--of mu: 0.4 is not allowed: adhesion = 200000: must be between" in err
+    assert not list(tmp_path.iterdir())
+
+
 def test_files_of_a_search(command, tmp_path):
     words = ("critical", "c", "--set", "pena_tang=0")
     code, out, _ = command(*words)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
-from itertools import chain, zip_longest
+from itertools import chain, islice, zip_longest
 from typing import Any
 
 import numpy as np
@@ -119,6 +119,8 @@ class Search:
         #: called with a message on the progress
         self.on_progress: Callable[[str], None] = lambda message: None
         self.trials: list[Trial] = []
+        #: why the first value that the case does not allow is refused
+        self.refused = ""
         #: how far paths are followed, see `FailurePath.follow`
         self.factor = ROUGH
         #: relative rise of the level that an increment of them aims at
@@ -145,14 +147,35 @@ class Search:
                 f"--of uplift: needs drains; uplift = {case['uplift']}: must be drained, or "
                 "cracked with drains = 1"
             )
-        if self.of in ("level", "strength"):
+        if self.of == "level":
             return
-        varied = parameter(self.name)
-        if not varied.real or varied.group == "Solver":
+        varied = self.of != "strength" and parameter(self.name)
+        if varied and (not varied.real or varied.group == "Solver"):
             raise InputError(
                 f"--of {self.of}: must be level, strength, uplift or a parameter that is a number "
                 "without steps"
             )
+        refused = ""
+        for value in chain(*(islice(values, 1) for values in self.down_and_up())):
+            try:
+                self.case_at(value)
+                return
+            except InputError as error:
+                refused = refused or f"--of {self.of}: {value:g} is not allowed: {error}"
+        if refused:
+            raise InputError(refused)
+
+    @property
+    def first_value(self) -> float:
+        """The case's own value, tried first."""
+        return 1.0 if self.of == "strength" else self.case[self.name]
+
+    def down_and_up(self) -> tuple[Iterator[float], Iterator[float]]:
+        """Values at increasing distance from the first, smaller and larger ones."""
+        low, high = TINY, np.inf
+        if self.of != "strength":
+            low, high = parameter(self.name).minimum, parameter(self.name).maximum
+        return outwards(self.first_value, low), outwards(self.first_value, high)
 
     @property
     def matters(self) -> bool:
@@ -410,7 +433,7 @@ class Search:
 
     def value(self) -> CriticalValue:
         """Search outwards from the case's own value for a stand and a failure, then bisect."""
-        first = self.trial(1.0 if self.of == "strength" else self.case[self.name])
+        first = self.trial(self.first_value)
         if self.of != "strength" and not self.matters:
             doubt = f"{result_of(first)} with any value: {self.name} has no effect; it needs "
             return self.no_limit(first, doubt + parameter(self.name).matters)
@@ -454,7 +477,8 @@ class Search:
             step *= 2
             try:
                 trial = self.trial(stands.value + step)
-            except InputError:  # the case allows no such value
+            except InputError as error:  # the case allows no such value
+                self.refused = self.refused or str(error)
                 break
             if not trial.stands:
                 return stands, trial
@@ -465,7 +489,8 @@ class Search:
         """The result if all trials stand, or all fail."""
         tried = [t.value for t in self.trials]
         span = f"{min(tried):.6g} to {max(tried):.6g}{self.unit}"
-        return self.no_limit(first, f"{result_of(first)} with all values tried, {span}")
+        further = f"; beyond: {self.refused}" if self.refused else ""
+        return self.no_limit(first, f"{result_of(first)} with all values tried, {span}{further}")
 
     def no_limit(self, trial: Trial, doubt: str) -> CriticalValue:
         """The result without a critical value, and why there is none; trial: any of them."""
@@ -482,7 +507,8 @@ class Search:
                 continue  # nearer than a trial with the same result
             try:
                 trial = self.trial(value)
-            except InputError:  # the case allows no such value
+            except InputError as error:  # the case allows no such value
+                self.refused = self.refused or str(error)
                 continue
             if trial.stands != first.stands:
                 near = min(self.trials[:-1], key=lambda t: abs(t.value - value))
@@ -508,13 +534,10 @@ class Search:
         return []
 
     def outwards(self, first: Trial) -> Iterator[float]:
-        """Values at increasing distance from the first: towards failure if it stands, else away
-        from it; alternately in both directions where failure may be in either.
+        """Values at increasing distance: towards failure if the first stands, else away from it;
+        alternately in both directions where failure may be in either.
         """
-        low, high = TINY, np.inf
-        if self.of != "strength":
-            low, high = parameter(self.name).minimum, parameter(self.name).maximum
-        up, down = outwards(first.value, high), outwards(first.value, low)
+        down, up = self.down_and_up()
         worse = {"strength": up, "k_h": up, "uplift": down}.get(self.of)
         if worse is None:
             by_turns = chain.from_iterable(zip_longest(up, down))
