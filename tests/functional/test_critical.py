@@ -404,10 +404,12 @@ def test_bad_input_is_refused(command, tmp_path, words, message):
     assert not list(tmp_path.iterdir())
 
 
-def test_values_that_a_law_ties_to_others_are_refused(command, tmp_path):
-    code, _, err = command("critical", "dam", "--of", "mu", "--set", "law=endo")
-    assert code == 2 and "--of mu: 0.4 is not allowed: adhesion = 200000: must be between" in err
-    assert not list(tmp_path.iterdir())
+def test_values_up_to_the_last_that_the_case_allows_are_tried():
+    """Silt reaches at most the crest; mu sigma_max of the law endo at most its cohesion."""
+    _, answer = search_result("dam", "silt_height", {"n_joint": 10.0}, "20")
+    assert answer.doubt.startswith("stands with all values tried, 0 to 43.75 m; beyond: ")
+    _, answer = search_result("dam", "mu", {"n_joint": 10.0, "law": "endo"}, "20")
+    assert answer.doubt.startswith("stands with all values tried, 0.7125 to 0.8; beyond: adhesion")
 
 
 def test_files_of_a_search(command, tmp_path):

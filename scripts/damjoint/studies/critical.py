@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
-from itertools import chain, islice, zip_longest
+from itertools import chain, zip_longest
 from typing import Any
 
 import numpy as np
@@ -87,6 +87,8 @@ GUESS_PRECISION = 1e-3
 
 #: How often a step of the search is doubled at most.
 MOST_DOUBLED = 20
+#: How often the distance to the last value that the case allows is halved.
+MOST_HALVED = 6
 
 
 class Search:
@@ -147,35 +149,14 @@ class Search:
                 f"--of uplift: needs drains; uplift = {case['uplift']}: must be drained, or "
                 "cracked with drains = 1"
             )
-        if self.of == "level":
+        if self.of in ("level", "strength"):
             return
-        varied = self.of != "strength" and parameter(self.name)
-        if varied and (not varied.real or varied.group == "Solver"):
+        varied = parameter(self.name)
+        if not varied.real or varied.group == "Solver":
             raise InputError(
                 f"--of {self.of}: must be level, strength, uplift or a parameter that is a number "
                 "without steps"
             )
-        refused = ""
-        for value in chain(*(islice(values, 1) for values in self.down_and_up())):
-            try:
-                self.case_at(value)
-                return
-            except InputError as error:
-                refused = refused or f"--of {self.of}: {value:g} is not allowed: {error}"
-        if refused:
-            raise InputError(refused)
-
-    @property
-    def first_value(self) -> float:
-        """The case's own value, tried first."""
-        return 1.0 if self.of == "strength" else self.case[self.name]
-
-    def down_and_up(self) -> tuple[Iterator[float], Iterator[float]]:
-        """Values at increasing distance from the first, smaller and larger ones."""
-        low, high = TINY, np.inf
-        if self.of != "strength":
-            low, high = parameter(self.name).minimum, parameter(self.name).maximum
-        return outwards(self.first_value, low), outwards(self.first_value, high)
 
     @property
     def matters(self) -> bool:
@@ -433,7 +414,7 @@ class Search:
 
     def value(self) -> CriticalValue:
         """Search outwards from the case's own value for a stand and a failure, then bisect."""
-        first = self.trial(self.first_value)
+        first = self.trial(1.0 if self.of == "strength" else self.case[self.name])
         if self.of != "strength" and not self.matters:
             doubt = f"{result_of(first)} with any value: {self.name} has no effect; it needs "
             return self.no_limit(first, doubt + parameter(self.name).matters)
@@ -475,15 +456,32 @@ class Search:
             stands, step = trial, trial.value - stands.value
         for _ in range(MOST_DOUBLED):
             step *= 2
-            try:
-                trial = self.trial(stands.value + step)
-            except InputError as error:  # the case allows no such value
-                self.refused = self.refused or str(error)
+            value = stands.value + step
+            last = self.trial_towards(value, stands.value)
+            if last and not last.stands:
+                return stands, last
+            if not last or last.value != value:
                 break
-            if not trial.stands:
-                return stands, trial
-            stands = trial
+            stands = last
         return None
+
+    def trial_towards(self, value: float, known: float) -> Trial | None:
+        """The trial of a value, or of the last one on the way to it that the case allows, which
+        begins at a known one; None if it allows none.
+        """
+        try:
+            return self.trial(value)
+        except InputError as error:
+            self.refused = self.refused or str(error)
+        begin = known
+        for _ in range(MOST_HALVED):
+            between = (known + value) / 2
+            try:
+                self.case_at(between)
+                known = between
+            except InputError:
+                value = between
+        return self.trial(known) if known != begin else None
 
     def no_change(self, first: Trial) -> CriticalValue:
         """The result if all trials stand, or all fail."""
@@ -501,17 +499,17 @@ class Search:
         """The nearest tried values of which one stands and the other fails; None if all trials have
         the first one's result.
         """
+        closed = set[bool]()
         for value in chain(self.guesses[:1], self.outwards(first)):
             distance, tried = value - first.value, [t.value - first.value for t in self.trials]
-            if any(d * distance > 0 and abs(d) >= abs(distance) for d in tried):
-                continue  # nearer than a trial with the same result
-            try:
-                trial = self.trial(value)
-            except InputError as error:  # the case allows no such value
-                self.refused = self.refused or str(error)
-                continue
-            if trial.stands != first.stands:
-                near = min(self.trials[:-1], key=lambda t: abs(t.value - value))
+            same_side = [d for d in tried if d * distance > 0]
+            if any(abs(d) >= abs(distance) for d in same_side) or (distance > 0) in closed:
+                continue  # nearer than a trial with the same result, or not allowed
+            trial = self.trial_towards(value, first.value + max(same_side, key=abs, default=0.0))
+            if not trial or trial.value != value:
+                closed.add(distance > 0)
+            if trial and trial.stands != first.stands:
+                near = min(self.trials[:-1], key=lambda t: abs(t.value - trial.value))
                 return (near, trial) if near.stands else (trial, near)
         return None
 
@@ -534,10 +532,13 @@ class Search:
         return []
 
     def outwards(self, first: Trial) -> Iterator[float]:
-        """Values at increasing distance: towards failure if the first stands, else away from it;
-        alternately in both directions where failure may be in either.
+        """Values at increasing distance from the first: towards failure if it stands, else away
+        from it; alternately in both directions where failure may be in either.
         """
-        down, up = self.down_and_up()
+        low, high = TINY, np.inf
+        if self.of != "strength":
+            low, high = parameter(self.name).minimum, parameter(self.name).maximum
+        up, down = outwards(first.value, high), outwards(first.value, low)
         worse = {"strength": up, "k_h": up, "uplift": down}.get(self.of)
         if worse is None:
             by_turns = chain.from_iterable(zip_longest(up, down))
