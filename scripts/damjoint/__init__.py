@@ -44,6 +44,7 @@ from __future__ import annotations
 
 TYPE_CHECKING = False  # importing typing takes time in which an interrupt is not yet handled
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from pathlib import Path
     from typing import Any
 
@@ -70,6 +71,16 @@ def require(holds: object, name: str, value: float | str, rule: str) -> None:
     if not holds:
         shown = value if isinstance(value, str) else f"{value:g}"
         raise InputError(f"{name} = {shown}: must {rule}")
+
+
+def meant(word: str, known: Iterable[str], most: int = 3) -> str:
+    """Return "did you mean ...?" with the known names nearest a word; empty if none is near."""
+    import difflib
+
+    names = list(known)
+    near = [name for name in names if name.lower() == word.lower()]
+    near = near or difflib.get_close_matches(word, names, most)
+    return f"did you mean {' or '.join(near)}?" if near else ""
 
 
 class RunError(RuntimeError):

@@ -10,7 +10,7 @@ import sys
 from importlib import import_module
 from types import ModuleType
 
-from .. import RUN_GEO, InputError, RunError, __version__
+from .. import RUN_GEO, InputError, RunError, __version__, meant
 from ..storage import SAVED
 from .options import Parser, say
 
@@ -67,6 +67,13 @@ def add_command(
     command.set_defaults(call=module.call)
 
 
+def check_command(word: str = "") -> None:
+    """Raise InputError if the first word of the command line is nearly a command."""
+    known = (*COMMANDS, *DEVELOPERS)
+    if word not in known and not word.startswith("-") and (hint := meant(word, known)):
+        raise InputError(f"{word}: unknown command; {hint}")
+
+
 def check_encoding(word: str) -> None:
     """Raise InputError if a word of the command line is not text in the encoding of the locale."""
     try:
@@ -107,6 +114,7 @@ def main(argv: list[str] | None = None) -> int:
     try:
         for word in words:
             check_encoding(word)
+        check_command(*words[:1])
         arguments = parser(*words[:1]).parse_args(with_negative_lists(words))
         if getattr(arguments, "run_geo", False):
             os.environ[RUN_GEO] = "1"  # an environment variable, for the processes of a sweep

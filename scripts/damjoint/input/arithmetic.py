@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
-from .. import data
+from .. import data, meant
 
 BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
@@ -33,10 +33,7 @@ class UnknownName(ValueError):
     """A name that is neither a unit nor known."""
 
     def __init__(self, name: str, known: Mapping[str, float]) -> None:
-        import difflib
-
-        near = difflib.get_close_matches(name, known, 1)
-        hint = f"did you mean {near[0]}?" if near else f"units: {', '.join(units())}"
+        hint = meant(name, known, 1) or f"units: {', '.join(units())}"
         super().__init__(f"{name} is unknown ({hint})")
 
 

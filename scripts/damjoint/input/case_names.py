@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from .. import InputError, data
+from .. import InputError, data, meant
 
 CASES = data("cases")
 
@@ -35,5 +35,7 @@ def case_file(case: str) -> Path:
             return path
     if Path(case).suffix == ".case":
         raise InputError(f"case {case}: there is no such file; damjoint new {case} writes one")
-    names = ", ".join(path.stem for path in sorted(CASES.glob("*.case")))
-    raise InputError(f"case {case}: unknown; allowed: {names}, or the path of a .case file")
+    names = [path.stem for path in sorted(CASES.glob("*.case"))]
+    hint = meant(case, names)
+    hint += f"{' ' if hint else ''}allowed: {', '.join(names)}, or the path of a .case file"
+    raise InputError(f"case {case}: unknown; {hint}")

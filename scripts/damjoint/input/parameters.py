@@ -16,7 +16,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from .. import InputError, __version__, data
+from .. import InputError, __version__, data, meant
 from ..arrays import Setting, Value
 from ..laws import LAWS
 from ..storage import atomic_write, cached
@@ -361,13 +361,7 @@ def parameter(name: str) -> Parameter:
     if name in TEXTS:
         raise InputError(f'{name}: must be set in the case ({name} = "...";){TEXTS[name]}')
     if name not in known:
-        import difflib
-
-        near = [n for n in known if n.lower() == name.lower()]
-        near = near or difflib.get_close_matches(name, known, 3)
-        hint = (
-            f"did you mean {' or '.join(near)}?" if near else f"allowed: {', '.join(sorted(known))}"
-        )
+        hint = meant(name, known) or f"allowed: {', '.join(sorted(known))}"
         raise InputError(f"{name}: unknown parameter; {hint}")
     return known[name]
 

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from scipy.optimize import bisect
 
-from .. import InputError
+from .. import InputError, meant
 from ..arrays import Setting
 from ..engines import engine_of
 from ..input.case import Case
-from ..input.parameters import independent, parameter
+from ..input.parameters import declared, independent, parameter
 from ..input.resolve import resolve, varied
 from ..joint.interface import interface_of
 from ..model.results import Results, row_of_joint
@@ -44,6 +44,9 @@ from .critical_words import (
     withdrawn,
 )
 from .failure_path import FailurePath, Trial
+
+#: What is searched for beside the values of parameters.
+OF = "level", "strength", "uplift"
 
 #: Parameters that are divided by the strength reduction factor. The fracture energies are included:
 #: the stresses of the softening curve are scaled, its jumps are not.
@@ -151,6 +154,8 @@ class Search:
             )
         if self.of in ("level", "strength"):
             return
+        if self.name not in declared() and (hint := meant(self.of, OF)):
+            raise InputError(f"--of {self.of}: unknown; {hint}")
         varied = parameter(self.name)
         if not varied.real or varied.group == "Solver":
             raise InputError(
