@@ -599,6 +599,7 @@ def test_the_picture_draws_and_judges_every_joint(solve, monkeypatch, tmp_path):
     for row, (name, judged) in enumerate(zip(result.case.joint_names, verdicts, strict=True), 1):
         assert f"{name}: {judged}" in texts
         assert (cells[row, 0], cells[row, 4]) == (name, judged)
+    assert any("; check: fail; diagrams: base" in text for text in texts)
     assert "k_h = 0.1" in texts
     assert any(text.startswith("loads: weight, water 30 m") for text in texts)
 

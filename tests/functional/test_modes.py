@@ -87,6 +87,7 @@ def test_the_command_writes_rows_picture_and_run_json(command, tmp_path):
     assert found.units["period"] == "s" and "Hz" in repr(found)
     lines = out.splitlines()
     assert "joints closed and undamaged; reservoir 40 m" in lines[0]
+    assert "with reservoir and massless rock Rayleigh damping set to 5 % at " in lines[0]
     assert f"{rows['frequency'][0]:.4g}" in out and max(map(len, lines[1:])) <= 80
     drawn = np.asarray(Image.open(folder / "dam_modes.png").convert("L"))
     assert (drawn < 200).mean() > 0.05

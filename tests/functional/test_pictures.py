@@ -448,6 +448,12 @@ def test_the_picture_of_a_critical_level_names_the_joint_and_all_values():
     axes = pictures.figure_of(4, 3).subplots()
     critical_picture.draw_levels(axes, content)
     assert [line.get_label() for line in axes.get_lines()] == ["crest 45 m"]
+    # the legend is below the diagram: no curve is behind it
+    figure = critical_picture.figure_of(content)
+    figure.draw_without_rendering()
+    (legend,), (axes,) = figure.findobj(Legend), figure.findobj(Axes)
+    box = legend.get_window_extent()
+    assert 0 < box.y0 < box.y1 < axes.xaxis.label.get_window_extent().y0
 
 
 def test_the_crest_of_a_geometry_of_ones_own_is_in_the_picture_of_its_critical_level():

@@ -34,7 +34,9 @@ class Variant:
 
     rock: str
     water: str
-    #: from the lowest; their damping is that of an earthquake of this variant
+    #: of an earthquake of this variant
+    damping: Damping
+    #: from the lowest, with their damping ratios
     modes: list[Mode]
     #: of each mode the displacement (nodes, dim) of each body, at most 1
     shapes: list[dict[str, Array]]
@@ -101,6 +103,7 @@ def natural_modes(case: Case, number: int) -> NaturalModes:
             yield Variant(
                 rock=rock,
                 water=water,
+                damping=damping,
                 modes=Mode.of(system, damping, frequencies, shapes)[:number],
                 shapes=[scaled(at_nodes(system, shape)) for shape in shapes.T[:number]],
             )

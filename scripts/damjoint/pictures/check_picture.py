@@ -90,6 +90,8 @@ class Content(NamedTuple):
     cells: list[tuple[str, ...]]
     #: a row per joint, its verdict last
     of_joints: list[tuple[str, ...]]
+    #: the worst of all joints
+    verdict: str
     #: the requirements that are not met
     why: str
 
@@ -104,11 +106,12 @@ def draw_check(content: Content, folder: Path) -> Path:
 @picture_style()
 def figure_of_check(content: Content) -> Figure:
     """Draw the last saved state of a scene."""
-    result, joint, methods, cells, of_joints, why = content
+    result, joint, methods, cells, of_joints, verdict, why = content
     figure = figure_of(*SIZE)
     joint_result, method = result.joints[joint], methods[joint]
     name = result.case.named((joint,))
-    title = textwrap.wrap(heading(joint_result) + (f"; diagrams: {name}" if name else ""), 100)
+    of_joint = f"; diagrams: {name}" if name else ""
+    title = textwrap.wrap(f"{heading(joint_result)}; check: {verdict}{of_joint}", 100)
     loads = textwrap.wrap(f"loads: {loads_label(result.case, loading_of(method))}", 150)
     reasons = textwrap.wrap(why, 150)
     top = 0.97 - TITLE * len(title) - REASON * (len(loads) + len(reasons))

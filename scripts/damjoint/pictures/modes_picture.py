@@ -44,12 +44,14 @@ def figure(natural: NaturalModes, about: str) -> Figure:
         draw_shape(axes, natural, first, k)
         mode = first.modes[k]
         title = f"mode {k + 1}: {mode.frequency:.3g} Hz, {1 / mode.frequency:.3g} s\n"
-        title += f"{mode.along_x:.0%} of the mass along x, {mode.along_y:.0%} along y"
+        along_x, along_y = 100 * mode.along_x, 100 * mode.along_y
+        title += f"{along_x:.0f} % of the mass along x, {along_y:.0f} % along y"
         axes.set_title(title, fontsize=8)
     lines = []
     for variant in natural.variants:
         values = ", ".join(f"{mode.frequency:.3g}" for mode in variant.modes)
-        lines.append(f"water: {variant.water}; rock: {variant.rock}: {values} Hz")
+        drawn = ", drawn" if variant is first else ""
+        lines.append(f"water: {variant.water}; rock: {variant.rock}{drawn}: {values} Hz")
     picture.text(0.1 / width, 0.1 / height, "\n".join(lines), va="bottom", fontsize=8)
     return picture
 

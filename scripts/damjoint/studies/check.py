@@ -442,7 +442,7 @@ def verdict_line(check: SafetyCheck) -> str:
     return f"check: {worst_verdict(check)}; equilibrium: {equilibrium}"
 
 
-def worst_verdict(check: SafetyCheck) -> str:
-    """The worse verdict of both methods on a joint."""
-    verdicts = [result.verdict for result in check.results]
+def worst_verdict(*checks: SafetyCheck) -> str:
+    """The worst verdict of both methods on joints."""
+    verdicts = [result.verdict for check in checks for result in check.results]
     return min(verdicts, key=(FAIL, NOT_JUDGED, UNCHECKED, PASS).index)

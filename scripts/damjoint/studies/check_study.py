@@ -20,7 +20,7 @@ from ..runner import run
 from ..session import finished, several
 from ..statics.gravity import GravityMethod
 from . import sensitivity
-from .check import CHECK, SafetyCheck, compare_joints, hand_calculation
+from .check import CHECK, SafetyCheck, compare_joints, hand_calculation, worst_verdict
 from .check_tables import joints_table, picture_table
 from .keys import key_of
 
@@ -96,7 +96,7 @@ def picture_content(result: Results, checks: list[SafetyCheck]) -> Content:
     methods = hand_calculations(result)
     k = min(range(len(methods)), key=lambda k: checks[k].margin)
     tables = picture_table(checks[k]), joints_table(checks)
-    return Content(result, k, methods, *tables, checks[k].why)
+    return Content(result, k, methods, *tables, worst_verdict(*checks), checks[k].why)
 
 
 def loads_table(methods: list[GravityMethod]) -> dict[str, list[Any]]:

@@ -42,6 +42,8 @@ GRAVITY = "gravity method"
 #: Widths of the dam and of a diagram, height below the heading [inches]; letters in an inch of the
 #: heading's title and of its other lines.
 DAM, CURVE, HEIGHT, TITLE, FACT = 7.0, 5.5, 5.4, 12, 14
+#: Height of the axis labels and the legend below a diagram [inches].
+LEGEND = 1.7
 #: Line styles of the gravity method's values, by its assumptions.
 DASHES: tuple[Any, ...] = ":", "--", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 3))
 
@@ -115,7 +117,7 @@ def figure_of(content: Content) -> Figure:
         ratios = wide, CURVE * curves
         of_dam, of_curves = below.subfigures(1, 2, squeeze=False, width_ratios=ratios)[0]
         draw_dam(of_dam, content.solution, float(content.solution.result.last["time"]))
-    *of_trials, of_paths = panels(of_curves, 1, curves, bottom=0.55, top=0.2)[0]
+    *of_trials, of_paths = panels(of_curves, 1, curves, bottom=LEGEND, top=0.2)[0]
     for axes in of_trials:
         draw_trials(axes, content)
     draw_paths(of_paths, content)
@@ -124,7 +126,8 @@ def figure_of(content: Content) -> Figure:
         widen(axes.yaxis)
         axes.grid(alpha=0.3)
         if axes.get_legend_handles_labels()[0]:  # an interrupted search may have no trial
-            axes.legend(fontsize=8)
+            place = 0, -0.5 / (HEIGHT - LEGEND - 0.2)
+            axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=place, frameon=False)
     return figure
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 
 from ..dynamics.modes import NaturalModes, natural_modes
@@ -13,6 +14,7 @@ from ..pictures import modes_picture
 from ..post import tables
 from ..post.summary import aligned
 from ..session import preparation, session
+from .quake_result import damping_of
 
 #: Headings of the printed table.
 HEADS = [
@@ -69,8 +71,9 @@ def about(natural: NaturalModes) -> str:
     case = natural.case
     water = f"added mass after {'Zangar' if case['added_mass'] == ZANGAR else 'Westergaard'}"
     water = water if case["added_mass"] else "added_mass = 0: the reservoir has no mass"
-    part = "stiffness and mass parts" if case["damping_mass"] else "stiffness part"
+    first = natural.variants[0]
+    damping = damping_of({"damping": asdict(first.damping)})
     return (
-        f"joints closed and undamaged; reservoir {case.levels[-1]:g} m, {water}; damping: "
-        f"Rayleigh's of {100 * case['damping']:g} % as in an earthquake, its {part}"
+        f"joints closed and undamaged; reservoir {case.levels[-1]:g} m, {water}; with "
+        f"{first.water} and {first.rock} rock {damping}"
     )
