@@ -247,6 +247,7 @@ def test_a_note_without_tension_gives_the_shortest_and_the_longest_crack():
     )
 
 
+@pytest.mark.heavy
 def test_a_note_says_which_crack_passes_the_drains(command):
     """In check, critical and report; with what each method assumes."""
     words = [w for name, value in DRAINED.items() for w in ("--set", f"{name}={value}")]
@@ -451,6 +452,7 @@ def test_a_mesh_of_ones_own_has_the_factors_of_its_section(tmp_path, solid, orde
     assert other.gravity.verdict == "fail"
 
 
+@pytest.mark.heavy
 def test_a_requirement_that_can_not_be_judged_is_not_passed(command, tmp_path):
     """A stepped joint has no gravity method; SSF is judged, OSF not."""
     stepped = ("stepped", "--levels", "30", "--tail-levels", "0", "--set", "required_SSF=1.2")

@@ -101,7 +101,13 @@ def test_commands_print_lines(command, frequent, words, pattern):
     assert code == 0 and re.search(pattern, err, re.MULTILINE), err
 
 
-@pytest.mark.parametrize("words", [("run", "dam", "--no-picture"), ("critical", "dam")])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", "dam", "--no-picture"),
+        pytest.param(("critical", "dam"), marks=pytest.mark.heavy),
+    ],
+)
 def test_before_the_first_step_the_lines_say_what_takes_the_time(command, frequent, words):
     """Sizes, also of several joints; then the steps."""
     lifts = ("--set", "lift_heights=15,30")

@@ -219,11 +219,8 @@ def test_a_scene_in_other_consistent_units_has_the_same_results(tmp_path, scene,
         assert not {n: off for n, off in differences(wanted, b).items() if off > 1e-10}
 
 
-@pytest.mark.parametrize(
-    "units",
-    [BINARY, *(pytest.param(u, marks=pytest.mark.heavy) for u in SYSTEMS.values())],
-    ids=["binary", *SYSTEMS],
-)
+@pytest.mark.heavy
+@pytest.mark.parametrize("units", [BINARY, *SYSTEMS.values()], ids=["binary", *SYSTEMS])
 def test_studies_in_other_consistent_units_have_the_same_results(tmp_path, units):
     """Critical level, safety factors, natural frequencies, an earthquake: to ten digits, with
     powers of two as units to the last one. (The dam must not rock for long: each time the joint

@@ -577,6 +577,7 @@ def quakes(folder):
     return {str(p.relative_to(folder)): p.read_text() for p in folder.rglob("*.csv")}
 
 
+@pytest.mark.heavy
 def test_several_records_in_several_processes(command, case_file, tmp_path, records):
     """Each earthquake has a folder and a row; one process computes the same."""
     words = "quake", case_file, *records, "--no-picture", *LONG_STEPS
@@ -633,7 +634,7 @@ def test_two_records_of_one_name_are_refused(refused, case_file, tmp_path):
     assert "must be given once, and have its own name" in message
 
 
-@pytest.mark.parametrize("engine", ["condensed", "getdp"])
+@pytest.mark.parametrize("engine", ["condensed", pytest.param("getdp", marks=pytest.mark.heavy)])
 def test_from_python_an_earthquake_is_what_the_command_writes(command, case_file, tmp_path, engine):
     """Rows, static states, frames, stress and summary, of either engine; nothing is written."""
     words = "--no-picture", "--set", "dt=0.01", "--set", "record_rest=0.6", "--out", "out"

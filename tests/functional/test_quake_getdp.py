@@ -121,6 +121,7 @@ def case_file(tmp_path):
     return path
 
 
+@pytest.mark.heavy
 def test_the_command_writes_the_tables_of_both_engines(command, case_file):
     """quake.csv, and the static states before and after the earthquake."""
     tables = []
