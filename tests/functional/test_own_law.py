@@ -21,7 +21,7 @@ from damjoint.statics.verdict import verdict
 class Springs(Law):
     """An elastic joint: K_N and K_T in tension and compression."""
 
-    limits_shear = False
+    has_friction = False
 
     def __init__(self, parameters):
         self.stiffness = np.diag([parameters["K_N"], parameters["K_T"], parameters["K_T"]])

@@ -196,7 +196,7 @@ def caption(scene: SolvedScene, step: int) -> tuple[str, str, str]:
     if now["process_zone"] > 0:
         state += f", softening {now['process_zone']:.3g} m"
     resultant = f"N' at {three_digits(now['x_resultant'])} m"
-    known = "SSF" if scene.result.case.law.limits_shear else "", "OSF"
+    known = "SSF" if scene.result.case.law.has_friction else "", "OSF"
     factors = [f"{n} {three_digits(now[n])}" for n in known if n in now]
     where = scene.numbers[step].positions[0]
     last = scene.result.case.times[-1]

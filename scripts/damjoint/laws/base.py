@@ -53,8 +53,8 @@ class Law(Generic[V]):
     softens = False
     #: whether the state under rising water depends on the steps that lead to it
     path_dependent = True
-    #: whether friction and cohesion, mu and adhesion, bound its shear stress: it has a SSF
-    limits_shear = True
+    #: whether friction and cohesion, mu and adhesion, bound its shear stress, so that it has a SSF
+    has_friction = True
     #: parameter of its hardening modulus [Pa/m]; empty: it does not harden
     hardening_parameter = ""
     #: whether slip raises the shear strength

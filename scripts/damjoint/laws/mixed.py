@@ -30,7 +30,7 @@ class Mixed(SofteningLaw[MixedVariables]):
 
     variable_names = ("kappa",)
     softens = True
-    limits_shear = False
+    has_friction = False
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         p = parameters

@@ -41,7 +41,7 @@ class Rupture(SofteningLaw[RuptureVariables]):
     slip_name = "released slip"
     softens = True
     works = ("grout_pressure", "saw_thickness")
-    limits_shear = False
+    has_friction = False
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         p, penalty = parameters, parameters["pena_rupture"]

@@ -132,7 +132,7 @@ def state_label(case: Case, state: Mapping[str, float]) -> str:
         for n, c in (("N'", "N"), ("T", "T"), ("U", "U"))
     ]
     factor = gravity.sliding_factor(case, state["N"], state["T"], state["bonded_length"])
-    known = case.law.limits_shear and np.isfinite(factor)
+    known = case.law.has_friction and np.isfinite(factor)
     where = gravity.position(state["x_resultant"], case.joint_length)
     place = (
         f"N' at {state['x_resultant']:.3g} m: {where}" if np.isfinite(state["x_resultant"]) else ""

@@ -69,6 +69,8 @@ def write_fields(solution: Solution, folder: Path) -> None:
     fine = {name: of_order(body, order) for name, body in bodies.items()}
     fine_surfaces = [of_order(surface, order) for surface in surfaces]
     regions = {name: bulk_cells({name: body})[1] for name, body in bodies.items()}
+    pairs = list(zip(solution.result.joints, fine_surfaces, strict=True))
+    on_joints = {t: [joint_data(joint, surface, t) for joint, surface in pairs] for t in fields}
     for time, field in fields.items():
         whole = {LEVEL: solution.result.at(time)["level"][:1]}
         for name, body in fine.items():
@@ -83,11 +85,10 @@ def write_fields(solution: Solution, folder: Path) -> None:
             path = file_of(folder, name, time)
             write_vtu(path, body.points, body.cells, at_nodes, in_elements, whole)
         for k, surface in enumerate(fine_surfaces):
-            data = joint_data(solution.result.joints[k], surface, time)
             on_faces = {
                 DISPLACEMENT: displacement_of_joint(solution, field, k, order),
-                "opening [m]": np.maximum(data["jump"][:, 1], 0),
-                **{with_unit(name): values for name, values in data.items()},
+                "opening [m]": np.maximum(on_joints[time][k]["jump"][:, 1], 0),
+                **{with_unit(name): values for name, values in on_joints[time][k].items()},
             }
             path = file_of(folder, numbered("joint", k), time)
             write_vtu(path, surface.points, surface.cells, on_faces, {}, whole)
@@ -98,11 +99,11 @@ def write_fields(solution: Solution, folder: Path) -> None:
         (DISPLACEMENT, "NodeData", displacement),
         (STRESS, "ElementData", {t: s[:, TENSOR] for t, s in stress.items()}),
     ]
-    on_joint = {time: joints_data(solution, surfaces, time) for time in fields}
+    at_nodes_of_all = {time: joined_data(on_joints[time], surfaces) for time in fields}
     joint_views: list[View] = [
-        (with_unit(name), "NodeData", {t: d[name] for t, d in on_joint.items()})
+        (with_unit(name), "NodeData", {t: d[name] for t, d in at_nodes_of_all.items()})
         for name in OF_JOINT
-        if name in next(iter(on_joint.values()))
+        if name in next(iter(at_nodes_of_all.values()))
     ]
     with atomic_write(folder / "bulk.msh") as path:
         points = np.concatenate([body.points for body in bodies.values()])
@@ -158,15 +159,13 @@ def joined(surfaces: Sequence[Body]) -> Body:
     )
 
 
-def joints_data(solution: Solution, surfaces: Sequence[Body], time: float) -> Table:
-    """The tables of all joints at the points of their surfaces, see `joint_data`; nan where a joint
-    has no such column.
+def joined_data(parts: Sequence[Table], surfaces: Sequence[Body]) -> Table:
+    """The tables of all joints, see `joint_data`, at the nodes of their surfaces, which come first
+    in each; nan where a joint has no such column.
     """
-    pairs = zip(solution.result.joints, surfaces, strict=True)
-    parts = [joint_data(joint, surface, time) for joint, surface in pairs]
-    missing = [np.full(len(surface.points), np.nan) for surface in surfaces]
+    pairs = [(p, np.full(len(s.points), np.nan)) for p, s in zip(parts, surfaces, strict=True)]
     return {
-        name: np.concatenate([p.get(name, m) for p, m in zip(parts, missing, strict=True)])
+        name: np.concatenate([part.get(name, none)[: len(none)] for part, none in pairs])
         for name in OF_JOINT
         if any(name in part for part in parts)
     }

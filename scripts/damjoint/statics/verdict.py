@@ -104,7 +104,7 @@ def decisive_joint(results: Results) -> int:
 
 def sliding_factor(results: Results, state: Mapping[str, float]) -> float:
     """SSF of the only joint in a row of its history; infinite if its law does not limit shear."""
-    if not results.case.law.limits_shear:
+    if not results.case.law.has_friction:
         return np.inf
     forces = state["N"], state["T"], state["bonded_length"]
     return gravity.sliding_factor(results.case, *forces)

@@ -366,7 +366,7 @@ class SafetyCheck:
             notes.append("between bodies that other joints hold: N and T are not limited")
         if not requirements(case):
             notes.append(f"only equilibrium is judged: {', '.join(REQUIREMENTS)} are not set")
-        if not case.law.limits_shear:
+        if not case.law.has_friction:
             strength = f"mu = {case['mu']:g}, adhesion = {case['adhesion']:g} Pa"
             notes.append(f"SSF with {strength}, which the law {case['law']} does not have")
         partial = {n: case[n] for n in ("factor_mu", "factor_c") if case[n] != 1}
@@ -408,7 +408,7 @@ class SafetyCheck:
 
 def required(case: Case) -> dict[str, float]:
     """Required safety factors, also by the law; nan if there is none."""
-    by_law = 1.0 if case.law.limits_shear else 0.0  # below it there is no equilibrium
+    by_law = 1.0 if case.law.has_friction else 0.0  # below it there is no equilibrium
     least = {"SSF": max(case["required_SSF"], by_law), "OSF": case["required_OSF"]}
     return {name: value or math.nan for name, value in least.items()}
 

@@ -203,6 +203,6 @@ class GravityValues:
 def block_stands(method: gravity.GravityMethod, longest: bool) -> bool:
     """Whether a rigid block stands; longest: with the longest of several cracks in equilibrium."""
     case, method = method.case, (method, *method.further)[-1] if longest else method
-    slides = case.law.limits_shear and method.SSF < 1
+    slides = case.law.has_friction and method.SSF < 1
     crushed = 0 < case["f_c"] < -method.sigma_n_toe
     return method.stands and not slides and not crushed

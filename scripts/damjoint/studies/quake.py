@@ -153,7 +153,7 @@ class QuakeRun:
         quake = self.quake
         summary = quake_summary.summary(quake, self.history.table, quake.halvings)
         for k, joint in enumerate(quake.case.joints if len(self.history) else ()):
-            if not joint.law.limits_shear or quake.case.graph.is_internal(k):
+            if not joint.law.has_friction or quake.case.graph.is_internal(k):
                 continue
             if (block := rigid_block(quake, k).slip(quake.record)) is not None:
                 summary["residual"][column_of("rigid_block", k)] = block

@@ -220,7 +220,7 @@ def values_at_end(case: Case, rows: Table, period: float) -> dict[str, Any]:
             )
             residual[column_of("slip", k)] = mean
             residual[column_of("tilt", k)] = (heel - toe) / joint.joint_along
-        if not joint.law.limits_shear:
+        if not joint.law.has_friction:
             broken[column_of("length", k)] = float(column["broken_length"][-1])
     return {
         "rest": rest,

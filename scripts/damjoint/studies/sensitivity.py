@@ -251,7 +251,7 @@ def values_of(side: Side) -> dict[str, float]:
     for k, joint in enumerate(side.model.case.joints):
         of_joint = {n: row[column_of(n, k)] for n in ("N", "T", "M", "bonded_length")}
         state = of_joint | {n: row[n] for n in ("time", "level")}
-        factors = factors_of_state(joint, state) if joint.law.limits_shear else {}
+        factors = factors_of_state(joint, state) if joint.law.has_friction else {}
         row |= {column_of(name, k): factors.get(name, np.nan) for name in FACTORS}
     return row
 
@@ -261,7 +261,7 @@ def values_of_sides(step: SidesInStep) -> dict[str, Array]:
     row = step.row()
     for k, joint in enumerate(step.sides.model.case.joints):
         factors = np.full((len(FACTORS), len(row["time"])), np.nan)
-        if joint.law.limits_shear:
+        if joint.law.has_friction:
             at = step.end.time, step.end.loading.level
             block = None if joint.geometry else with_crack(joint, *at, 0.0)
             for side, model in enumerate(step.sides.models):

@@ -144,7 +144,7 @@ def state_of(result: Results) -> dict[str, float]:
     """The last row of a joint's history, its mean tangential jump [m] and its sliding factor."""
     last, case = result.last, result.case
     factor = np.inf
-    if case.law.limits_shear:
+    if case.law.has_friction:
         factor = gravity.sliding_factor(case, last["N"], last["T"], last["bonded_length"])
     rows = result.at(last["time"]) if len(result.joint["time"]) else {}
     slip = float(np.mean(rows["delta_t1"])) if rows else np.nan
