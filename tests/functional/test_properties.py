@@ -250,8 +250,8 @@ def test_a_scene_in_other_consistent_units_has_the_same_results(tmp_path, scene,
 @pytest.mark.parametrize("units", [BINARY, *SYSTEMS.values()], ids=["binary", *SYSTEMS])
 def test_studies_in_other_consistent_units_have_the_same_results(tmp_path, units):
     """Critical level, safety factors, a sweep, natural frequencies, an earthquake: to ten digits,
-    with powers of two as units to the last one. (The dam must not rock for long: each time the joint
-    closes, the rounding of the values grows tenfold, as any other difference would.)
+    with powers of two as units to the last one. (The dam must not rock for long: each time the
+    joint closes, the rounding of the values grows tenfold, as any other difference would.)
     """
     within = 0 if units == BINARY else 1e-10
     length, _, acceleration = units
