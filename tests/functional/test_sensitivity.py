@@ -203,6 +203,22 @@ def test_fifty_parameters_of_a_dam_with_lifts():
         assert total == pytest.approx(expected, rel=1e-6, abs=1e-6 * abs(last[column])), column
 
 
+@pytest.mark.parametrize("given", [{}, {"G_f": 90.0}, {"pena_rupture": 3.0}])
+def test_all_parameters_of_a_law_whose_energy_is_given_twice(given):
+    """Of G_f and pena_rupture one follows from the other; each joint has values of its own in a
+    list, from which the softening of this joint alone follows.
+    """
+    lifts = {"lift_heights": (12.0,), "K_N": (1e11, 2e11), "sigma_max": (1e5, 2e5)}
+    coarse = {"n_joint": 3, "order": 1, "law": "rupture"}
+    case = dj.case("dam", levels=[20], steps=1, **coarse, **lifts, **given)
+    names = sensitivity.all_of(case)
+    found = {"G_f", "pena_rupture"} & {name.rpartition(".")[2] for name in names}
+    assert found == set(given or ("G_f", "pena_rupture"))
+    rows = {row.name: row.derivatives for row in sensitivity.of_run(case, names)}
+    assert set(names) - rows.keys() <= {"saw_thickness"}  # a kink
+    assert rows["lift 12 m.K_N"]["max_opening_2"] != 0
+
+
 def test_a_load_that_is_zero_has_a_derivative_on_its_side():
     """The vertical acceleration takes weight off, the line force of ice is not negative."""
     case = dj.case("dam", levels=[20], n_joint=10)

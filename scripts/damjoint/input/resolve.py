@@ -166,9 +166,9 @@ def varied(
     steps: int | None = None,
     accuracy: str | None = None,
 ) -> Case:
-    """The case with other values of any parameters, and with another loading or accuracy where they
-    are not None; arguments as in `load`. The parameters that follow others follow them; name and
-    record stay.
+    """The case with other values of any parameters, "base.mu" also where the case has a list, and
+    with another loading or accuracy where they are not None; arguments as in `load`. The parameters
+    that follow others follow them; name and record stay.
 
     Raises InputError.
     """
@@ -176,7 +176,15 @@ def varied(
         raise InputError(f"case {case.name}: of stored results; must be a case that was loaded")
     given = {"levels": levels, "tail_levels": tail_levels, "steps": steps, "accuracy": accuracy}
     changes: dict[str, Any] = {n: value for n, value in given.items() if value is not None}
-    result = resolve(replace(case.source.with_overrides(overrides or {}), **changes))
+    settings: dict[str, Any] = dict(overrides or {})
+    before = case.source.text.of_joints | case.source.overrides
+    for name in [name for name in settings if "." in name]:
+        joint, _, of_joint = name.rpartition(".")
+        listed: Any = settings.get(of_joint, before.get(of_joint))
+        if isinstance(listed, (list, tuple)) and of_joint not in (overrides or {}):
+            value, entries = settings.pop(name), zip(case.joint_names, listed, strict=True)
+            settings[of_joint] = tuple(value if n == joint else v for n, v in entries)
+    result = resolve(replace(case.source.with_overrides(settings), **changes))
     files = case.record, case.record_vertical
     return replace(result, name=case.name, record=files[0], record_vertical=files[1])
 

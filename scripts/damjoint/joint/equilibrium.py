@@ -4,6 +4,7 @@ water, and the problem of a step made from them.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from copy import copy
 from functools import lru_cache
 
@@ -83,6 +84,19 @@ class Equilibrium:
         other.case = case
         pairs = zip(case.joints, self.case.joints, self.laws.laws, strict=True)
         other.laws = JointLaws([law if a.values == b.values else a.law for a, b, law in pairs])
+        return other
+
+    def with_cracks(self, some: Collection[JointWater]) -> Equilibrium:
+        """The same with the water of some joints, that exchange none with others, in the cracks of
+        the laws of this case.
+        """
+        if not some:
+            return self
+        other = copy(self)
+        changed = {water: water.with_law(self.case.joints[water.number]) for water in some}
+        systems = {water.system: new.system for water, new in changed.items()}
+        other.water = [changed.get(water, water) for water in self.water]
+        other.flowing = tuple(systems.get(system, system) for system in self.flowing)
         return other
 
     def with_loads(self, case: Case) -> Equilibrium:

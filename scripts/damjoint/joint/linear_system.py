@@ -17,7 +17,7 @@ from __future__ import annotations
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.linalg import norm
@@ -71,7 +71,8 @@ class Border:
     slope: Array
     row: Array
     rate: float
-    gap: float
+    #: of each right side, where there are several
+    gap: float | Array
 
 
 class Stalled(RunError):
@@ -83,8 +84,9 @@ class LinearSystem(Protocol):
 
     def solve(
         self, tangent: Tangent, right: Array, border: Border | None = None
-    ) -> tuple[Array, float]:
-        """Solve for right (j,), bordered or not: x, and s, 0 without border.
+    ) -> tuple[Array, Any]:
+        """Solve for right (j,), bordered or not: x, and s, 0 without border. By Woodbury's formula
+        also for several right sides (j, k): x (j, k), and s (k,) with a border.
 
         Raises LinAlgError if the system is singular.
         """
@@ -100,7 +102,7 @@ class DenseSystem:
 
     def solve(
         self, tangent: Tangent, right: Array, border: Border | None = None
-    ) -> tuple[Array, float]:
+    ) -> tuple[Array, Any]:
         """See `LinearSystem`."""
         return lu_solve(self.matrix(tangent), right), 0.0
 
@@ -154,7 +156,7 @@ class WoodburySystem:
 
     def solve(
         self, tangent: Tangent, right: Array, border: Border | None = None
-    ) -> tuple[Array, float]:
+    ) -> tuple[Array, Any]:
         """See `LinearSystem`."""
         compliance, flow = self.compliance, tangent.flow
         law, rows = self.assembly.change(tangent.law, self.undamaged)
@@ -174,10 +176,10 @@ class WoodburySystem:
             return solve_whole(whole, right, border)
         start = compliance @ right
         small = np.zeros((size + (border is not None),) * 2)
-        small_right = np.zeros(len(small))
+        small_right = np.zeros((len(small), *right.shape[1:]))
         touched = distinct(law.indices)
         small[:m, :m] = law.columns(touched) @ compliance[np.ix_(touched, rows)]
-        small_right[:m] = law @ start
+        small_right[:m] = law.on_rows(start.T).T
         if flow and lift:
             by_pressure = self.by_pressure(lift)
             small[:m, m:size] = -(law @ by_pressure)
@@ -194,7 +196,7 @@ class WoodburySystem:
             small[size, size] = border.rate - border.row @ by_slope
             small_right[size] = border.gap - border.row @ start
         solution = lu_solve(small, small_right)
-        force = np.zeros(len(right))
+        force = np.zeros(right.shape)
         force[rows] = solution[:m]
         x = start - compliance @ force
         if flow:
@@ -202,7 +204,7 @@ class WoodburySystem:
         if border is None:
             return x, 0.0
         s = solution[size]
-        x -= s * by_slope
+        x -= np.multiply.outer(by_slope, s)
         return x, s
 
     def solve_columns(
@@ -213,7 +215,7 @@ class WoodburySystem:
         tangent: Tangent,
         right: Array,
         border: Border | None,
-    ) -> tuple[Array, float]:
+    ) -> tuple[Array, Any]:
         """Solve by a system of the unknowns x_c alone on which the change M = L - B P of the matrix
         acts; law: L without its zero rows; columns: those of M that are not zero.
 
@@ -237,18 +239,18 @@ class WoodburySystem:
             if flow:
                 small[number, place] += (border.row @ by_pressure) @ flow.pressure
             small[number, number] = border.rate - border.row @ by_slope
-            small_right = np.append(small_right, border.gap - border.row @ start)
+            small_right = with_gap(small_right, border.gap - border.row @ start)
         solution = lu_solve(small, small_right)
         changed = solution[:number]
-        force = np.zeros(len(right))
-        force[rows] = law @ changed
+        force = np.zeros(right.shape)
+        force[rows] = law.on_rows(changed.T).T
         x = start - compliance @ force
         if flow:
             x += by_pressure @ (flow.pressure @ changed[place])
         if border is None:
             return x, 0.0
-        s = float(solution[number])
-        return x - s * by_slope, s
+        s = solution[number]
+        return x - np.multiply.outer(by_slope, s), s
 
 
 def many_systems(assembly: Assembly, stiffness: Array, undamaged: Array) -> LinearSystem:
@@ -260,8 +262,8 @@ def many_systems(assembly: Assembly, stiffness: Array, undamaged: Array) -> Line
     return WoodburySystem(assembly, stiffness, undamaged)
 
 
-def solve_whole(whole: Array, right: Array, border: Border | None) -> tuple[Array, float]:
-    """Solve A x = right (j,), by LU; A has room for a border, and may be overwritten."""
+def solve_whole(whole: Array, right: Array, border: Border | None) -> tuple[Array, Any]:
+    """Solve A x = right (j, ...), by LU; A has room for a border, and may be overwritten."""
     if border is None:
         return lu_solve(whole, right), 0.0
     matrix = whole[:-1, :-1]
@@ -269,8 +271,13 @@ def solve_whole(whole: Array, right: Array, border: Border | None) -> tuple[Arra
     scale = max(matrix.max(), -matrix.min()) / (np.abs(border.row).max() or 1)
     whole[:-1, -1] = border.slope
     whole[-1, :-1], whole[-1, -1] = scale * border.row, scale * border.rate
-    *x, s = lu_solve(whole, np.append(right, scale * border.gap))
-    return np.array(x), float(s)
+    solution = lu_solve(whole, with_gap(right, scale * border.gap))
+    return solution[:-1], solution[-1]
+
+
+def with_gap(right: Array, gap: float | Array) -> Array:
+    """Right sides (j, ...) with a gap (...) as their last row."""
+    return np.concatenate([right, np.reshape(gap, (1, *right.shape[1:]))])
 
 
 def positive_inverse(matrix: Array) -> Array:
@@ -320,14 +327,15 @@ DECAY = 0.1
 
 
 def lu_solve(matrix: Array, right: Array) -> Array:
-    """Solve a linear system by LU; the matrix may be overwritten.
+    """Solve a linear system by LU for right (j, ...); the matrix may be overwritten.
 
-    A large matrix is factorised in single precision, twice as fast, and the solution refined; in
-    double precision if the refinement does not converge. Raises LinAlgError if it is singular.
+    With one right side a large matrix is factorised in single precision, twice as fast, and the
+    solution refined; in double precision if the refinement does not converge. Raises LinAlgError
+    if it is singular.
     """
     if not right.any():
         return np.zeros_like(right)
-    if len(right) > SINGLE_PRECISION:
+    if len(right) > SINGLE_PRECISION and right.ndim == 1:
         lapack = scipy_linalg().lapack
         factors, pivots, info = lapack.sgetrf(matrix.T.astype(np.float32), overwrite_a=True)
         solution: Array = np.zeros_like(right)

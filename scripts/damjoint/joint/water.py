@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -101,6 +102,13 @@ class JointWater:
         self.along = lru_cache(maxsize=4)(self._along)
         #: of the last loadings, see `_head`
         self.head = lru_cache(maxsize=8)(self._head)
+
+    def with_law(self, case: Case) -> JointWater:
+        """The same, that exchanges water with no other joint, for a case with another law."""
+        other = copy(self)
+        other.case, other.law, other.system = case, case.law, copy(self.system)
+        other.system.members, other.system.last_solution = (other,), None
+        return other
 
     def _along(self, matrix: CsrMatrix | None) -> tuple[Array, Array, Array]:
         along = self.system.fields

@@ -37,14 +37,13 @@ from ..input.values import flows, flows_in_time, freezes_uplift
 from ..joint.equilibrium import Equilibrium
 from ..joint.flow import FlowDerivative
 from ..joint.interface import JointInterface
-from ..joint.linear_system import Border, Tangent, matrix_of
+from ..joint.linear_system import Border, Tangent
 from ..joint.problem import JointProblem, rate
-from ..joint.water import Pressure
+from ..joint.water import Pressure, WaterSystem
 from ..laws import Law
 from ..mesh.generate import MARKS
 from ..model.loads import LEVEL, Loading
 from ..model.results import column_of, history_table
-from ..threads import scipy_linalg
 from .controls import DisplacementControl, Prescribed
 from .history import History, JointState
 from .model import Begun, Model, StepResult
@@ -71,9 +70,6 @@ OF_LOADS = "rho_dam", "rho_found"
 #: joint is loaded.
 MODULI = "E", "E_dam", "E_found"
 LOADING = "rho_dam", "rho_water", "g"
-
-#: Number of unknowns up to which numpy inverts, as scipy would take longer to load.
-FEW = 1500
 
 #: Groups of parameters on which the mesh or the way to the solution depends.
 NOT_CONTINUOUS = "Mesh", "Solver", "Geometry"
@@ -181,38 +177,23 @@ class Linearised:
     #: with a prescribed displacement; its gap is that of each right side
     border: Border | None
 
-    @cached_property
-    def solver(self) -> Callable[[Array], Array]:
-        """That of the dense system with its border, for several right sides of each parameter.
-
-        Raises LinAlgError if the system is singular.
-        """
-        assert not isinstance(self.problem.stiffness, CsrMatrix)
-        assembly = self.problem.interface.assembly
-        matrix = matrix_of(assembly, self.problem.stiffness, self.tangent)
-        if border := self.border:
-            corner = np.array([[border.rate]])
-            matrix = np.block([[matrix, border.slope[:, None]], [border.row[None], corner]])
-        if len(matrix) <= FEW:
-            inverse = np.linalg.inv(matrix)
-            return lambda rights: np.asarray(inverse @ rights)
-        factors = scipy_linalg().lu_factor(matrix)
-        return lambda rights: np.asarray(scipy_linalg().lu_solve(factors, rights))
-
     def solve(self, rights: Array, gaps: Array) -> tuple[Array, Array]:
         """The solutions (j, k) for right sides (j, k), and the rates (k,) of the level for gaps
         (k,), zero without border.
 
         Raises LinAlgError if the system is singular.
         """
-        if isinstance(self.problem.stiffness, CsrMatrix):
-            borders = [self.border and replace(self.border, gap=float(gap)) for gap in gaps]
-            system, pairs = self.problem.system, zip(rights.T, borders, strict=True)
-            columns = [system.solve(self.tangent, right, border) for right, border in pairs]
-            return np.array([x for x, _ in columns]).T, np.array([s for _, s in columns])
-        whole = np.vstack([rights, gaps]) if self.border else rights
-        solution = self.solver(whole)
-        return (solution[:-1], solution[-1]) if self.border else (solution, np.zeros(len(gaps)))
+        system, border = self.problem.system, self.border
+        if not isinstance(self.problem.stiffness, CsrMatrix):
+            columns, rates = system.solve(
+                self.tangent, rights, border and replace(border, gap=gaps)
+            )
+            return columns, rates if border else np.zeros(len(gaps))
+        found = [
+            system.solve(self.tangent, right, border and replace(border, gap=float(gap)))
+            for right, gap in zip(rights.T, gaps, strict=True)
+        ]
+        return np.array([x for x, _ in found]).T, np.array([s for _, s in found])
 
 
 def is_automatic(case: Case, name: str) -> bool:
@@ -283,18 +264,18 @@ class Alike:
 
     def of(self, side: int) -> tuple[Any, Any]:
         """The internal variables of a side: of Gauss points and nodes."""
-        number, k = len(self.sides), int(np.searchsorted(self.sides, side))
-        return part_of(self.points, k, number), part_of(self.nodes, k, number)
+        chosen, number = np.flatnonzero(self.sides == side), len(self.sides)
+        return parts_of(self.points, chosen, number), parts_of(self.nodes, chosen, number)
 
 
-def part_of(variables: Any, k: int, number: int) -> Any:
-    """The k-th of a number of equal parts of the arrays of internal variables."""
-    if variables is None:
-        return None
+def parts_of(variables: Any, chosen: IntArray, number: int) -> Any:
+    """The chosen ones of a number of equal parts of the arrays of internal variables."""
+    if variables is None or len(chosen) == number:
+        return variables
     values = {f.name: getattr(variables, f.name) for f in fields(variables)}
     arrays = {n: v for n, v in values.items() if isinstance(v, np.ndarray) and v.ndim}
-    cut = {n: v[k * (len(v) // number) : (k + 1) * (len(v) // number)] for n, v in arrays.items()}
-    return replace(variables, **cut)
+    parts = {n: v.reshape(number, -1, *v.shape[1:])[chosen] for n, v in arrays.items()}
+    return replace(variables, **{n: v.reshape(-1, *v.shape[2:]) for n, v in parts.items()})
 
 
 class Differentiation:
@@ -391,9 +372,11 @@ class Differentiation:
             return whole
         same_loads = model.equilibrium
         if known.group == "Joint" or of_joint in OF_LAW:
+            joints = zip(same_loads.water, case.joints, other.joints, strict=True)
+            cracks = [water for water, a, b in joints if water_differs(a, b)]
             same_loads = same_loads.with_laws(other)
-            if not (self.apart or any(map(water_differs, case.joints, other.joints))):
-                return model.sharing(other, same_loads)
+            if not (self.apart or any(water.system.network for water in cracks)):
+                return model.sharing(other, same_loads.with_cracks(cracks))
         elif of_joint in OF_LOADS or known.group == "Loads":
             return model.sharing(other, same_loads.with_loads(other))
         equilibrium = Equilibrium(other, same_loads.interface)
@@ -410,7 +393,10 @@ class Differentiation:
         doubtful = {n: v for n, v in values.items() if n not in alone and n not in MODULI}
         if not doubtful:
             return alone
-        expected, resolved = case, varied(case, doubtful)
+        try:
+            expected, resolved = case, varied(case, doubtful)
+        except InputError:  # G_f and pena_rupture exclude each other
+            return alone
         for name, value in doubtful.items():
             expected = expected.with_value(name, value)
         same = all(
@@ -509,8 +495,10 @@ class SidesInStep:
         #: of the parameters: rates of the jump and of what is unknown beside it
         self.rate = np.zeros((sides.number, len(self.end.jump)))
         self.level_rate = np.zeros(sides.number)
-        #: of the sides: tangents of the laws where they have last been evaluated
-        self.tangents = np.zeros((len(sides.offsets), *self.linear.tangent.law.shape))
+        #: of the sides: jumps at which the laws have last been evaluated, tractions and tangents
+        points = len(sides.offsets), *self.linear.tangent.law.shape
+        self.evaluated, self.traction = np.zeros((2, *points[:-1]))
+        self.tangents = np.zeros(points)
         #: of the sides: their steps, if each is evaluated apart
         self.begun = list[Begun]()
         if sides.apart:
@@ -542,78 +530,81 @@ class SidesInStep:
             return of
         return self.unknown.at(of, self.unknown.of(self.end.loading) + float(self.shifts[side]))
 
-    def at(self, matrix: CsrMatrix) -> Array:
-        """The jumps (sides, q, 3) at points, by `at_points` or `at_nodes` of the interface."""
-        dim = self.sides.model.equilibrium.interface.dim
-        jumps = np.zeros((len(self.sides.offsets), matrix.shape[0] // dim, 3))
-        jumps[:, :, :dim] = matrix.on_rows(self.jumps).reshape(len(jumps), -1, dim)
+    def at(self, matrix: CsrMatrix, some: IntArray | slice = slice(None)) -> Array:
+        """The jumps (some, q, 3) of some sides, at points by `at_points` or `at_nodes`."""
+        dim, unknowns = self.sides.model.equilibrium.interface.dim, self.jumps[some]
+        jumps = np.zeros((len(unknowns), matrix.shape[0] // dim, 3))
+        jumps[:, :, :dim] = matrix.on_rows(unknowns).reshape(len(jumps), -1, dim)
         return jumps
 
-    def tractions(self, some: Sequence[int]) -> Array:
-        """The tractions (sides, q, 3) of the laws at the Gauss points, of some sides; their
-        tangents are kept.
-        """
-        jumps, chosen = self.at(self.sides.model.equilibrium.interface.at_points), set(some)
-        traction = np.zeros_like(jumps)
+    def evaluate(self, some: IntArray) -> None:
+        """Evaluate the laws at the Gauss points, of some sides."""
+        at_points = self.sides.model.equilibrium.interface.at_points
+        self.evaluated[some] = self.at(at_points, some)
         for part, joint in self.sides.of_joints(self.problem.variables.starts):
             for alike in joint:
-                if chosen.isdisjoint(alike.sides.tolist()):
+                if not len(chosen := np.flatnonzero(np.isin(alike.sides, some))):
                     continue
-                (
-                    traction[alike.sides, part],
-                    self.tangents[alike.sides, part],
-                ) = alike.response(jumps[alike.sides, part], alike.begun[0])
-        return traction
+                sides, variables = alike.sides[chosen], alike.begun[0]
+                variables = parts_of(variables, chosen, len(alike.sides))
+                of = alike.response(self.evaluated[sides, part], variables)
+                self.traction[sides, part], self.tangents[sides, part] = of
 
-    def residuals(self, some: Sequence[int]) -> Array:
-        """The forces out of balance (sides, j); those that are not among some have no meaning."""
-        jumps, shifts, sides, problem = self.jumps, self.shifts, self.sides, self.problem
-        values = np.zeros_like(jumps)
+    def residuals(self, some: IntArray) -> Array:
+        """The forces out of balance (some, j) of some sides."""
+        jumps, shifts, sides, problem = self.jumps[some], self.shifts, self.sides, self.problem
         if sides.apart:
-            for k in some:
-                residual = self.begun[k].problem.residual(jumps[k], self.loading(k))
-                values[k], self.tangents[k] = residual.value, residual.by_jump(False).law
+            values = np.zeros_like(jumps)
+            for row, k in enumerate(some.tolist()):
+                residual = self.begun[k].problem.residual(self.jumps[k], self.loading(k))
+                values[row], self.tangents[k] = residual.value, residual.by_jump(False).law
             return values
         values = (problem.stiffness @ jumps.T).T
         base = sides.model.equilibrium
         if self.control:
             slope = rate(base.loads, self.end.loading, problem.size, self.unknown)
-        for k in some:
+        for row, k in enumerate(some.tolist()):
             of = sides.models[k].equilibrium
             if of.bulk is not base.bulk:
-                values[k] = of.bulk.stiffness @ jumps[k]
+                values[row] = of.bulk.stiffness @ jumps[row]
             if of.loads is not base.loads:
-                values[k] -= of.loads(self.loading(k))
+                values[row] -= of.loads(self.loading(k))
             elif self.control:
-                values[k] -= base.loads(self.end.loading) + shifts[k] * slope
+                values[row] -= base.loads(self.end.loading) + shifts[k] * slope
             else:
-                values[k] -= base.loads(self.end.loading)
-        values += base.interface.forces(self.tractions(some))
+                values[row] -= base.loads(self.end.loading)
+        self.evaluate(some)
+        values += base.interface.forces(self.traction[some])
         if base.flowing:
             values -= self.lifts(some)
         return values
 
-    def lifts(self, some: Sequence[int]) -> Array:
-        """Forces (sides, j) of the water that flows: where it is that of the case, to first order
-        around the end.
+    def lifts(self, some: IntArray) -> Array:
+        """Forces (some, j) of the water that flows, of some sides: where it is that of the case, to
+        first order around the end.
         """
-        end, base, water = self.end, self.sides.model.equilibrium, self.problem.water
+        end, water, total = self.end, self.problem.water, np.zeros((len(some), len(self.end.jump)))
         assert water
-        total = np.zeros_like(self.jumps)
-        for system, nodal in zip(base.flowing, self.nodal, strict=True):
+        for number, system in enumerate(water.flowing):
+            nodal, part = self.nodal(number)[some], np.zeros_like(total)
             for joint in system.members:
                 beyond = joint.wetted.fields.on_rows(nodal[:, joint.nodes])
-                total += joint.lift(end.loading, beyond)
-        if self.control:
-            lift = lambda other: water.flow(end.jump, other).lift
-            slope = rate(lift, end.loading, self.problem.size, self.unknown)
-            total += self.shifts[:, None] * slope
-        for k in some:
-            of = self.sides.models[k].equilibrium
-            if of.flowing is not base.flowing:
-                step = of.water_in_step(water.variables)
-                total[k] = step.flow(self.jumps[k], self.loading(k)).lift
+                part += joint.lift(end.loading, beyond)
+            if self.control:
+                lift = partial(self.lift_of, system, end.jump)
+                slope = rate(lift, end.loading, self.problem.size, self.unknown)
+                part += self.shifts[some, None] * slope
+            for row, k in enumerate(some.tolist()):
+                own = self.sides.models[k].equilibrium.flowing[number]
+                if own is not system:
+                    part[row] = self.lift_of(own, self.jumps[k], self.loading(k))
+            total += part
         return total
+
+    def lift_of(self, system: WaterSystem, jump: Array, loading: Loading) -> Array:
+        """Forces (j,) of the water that flows in a system."""
+        assert self.problem.water
+        return replace(self.problem.water, flowing=(system,)).flow(jump, loading).lift
 
     @cached_property
     def solved(self) -> list[tuple[Array, FlowDerivative | None]]:
@@ -631,19 +622,14 @@ class SidesInStep:
             for system, solution in zip(water.flowing, flow.solutions, strict=True)
         ]
 
-    @property
-    def nodal(self) -> list[Array]:
-        """Of each `flowing` the pressure beyond the imposed one at the nodes (sides, n)."""
-        moved = self.jumps - self.end.jump
-        result = []
-        for system, (nodal, rates) in zip(
-            self.sides.model.equilibrium.flowing, self.solved, strict=True
-        ):
-            values = np.tile(nodal, (len(moved), 1))
-            if rates:
-                values[:, system.fields.inside] += moved[:, rates.columns] @ rates.pressure.T
-            result.append(values)
-        return result
+    def nodal(self, number: int) -> Array:
+        """Of one of `flowing` the pressure beyond the imposed one at the nodes (sides, n)."""
+        system, moved = self.sides.model.equilibrium.flowing[number], self.jumps - self.end.jump
+        nodal, rates = self.solved[number]
+        values = np.tile(nodal, (len(moved), 1))
+        if rates:
+            values[:, system.fields.inside] += moved[:, rates.columns] @ rates.pressure.T
+        return values
 
     # -- their derivatives
 
@@ -656,8 +642,8 @@ class SidesInStep:
         number, distance = sides.number, sides.distance
         some = np.arange(number)
         for correction in range(CORRECTIONS if number else 0):
-            values = self.residuals([*some.tolist(), *(some + number).tolist()])
-            rights = ((values[:number] - values[number:]).T / distance)[:, some]
+            low, high = np.split(self.residuals(np.concatenate([some, some + number])), 2)
+            rights = (low - high).T / distance[some]
             if correction < 2:
                 change, level_change = self.linear.solve(rights, self.gaps()[some])
             else:
@@ -766,7 +752,7 @@ class SidesInStep:
         water, variables, result = base.water[joint], self.problem.water.variables, []
         nodal: Sequence[Array | None] = [None] * len(sides.offsets)
         if water.system in base.flowing and not self.control:
-            nodal = list(self.nodal[base.flowing.index(water.system)][:, water.nodes])
+            nodal = list(self.nodal(base.flowing.index(water.system))[:, water.nodes])
         for side, (model, jump) in enumerate(zip(sides.models, self.jumps, strict=True)):
             of = model.equilibrium.water[joint]
             if of is water and not (self.control or water.flowing):
@@ -782,28 +768,33 @@ class SidesInStep:
         """
         interface, number = self.sides.model.equilibrium.interface, len(self.sides.offsets)
         at_points, at_nodes = (self.at(m) for m in (interface.at_points, interface.at_nodes))
+        if self.sides.apart:
+            self.evaluate(np.arange(number))
+        # the last correction is small: that of the tractions is linear
+        change = np.einsum("sqij,sqj->sqi", self.tangents, at_points - self.evaluated)
+        traction = self.traction + change
         row = {
             "time": np.full(number, self.end.time),
             "level": np.array([self.loading(k).level for k in range(number)]),
             "crest_ux": self.displacement("crest") - self.sides.crest_at_rest,
         }
         for k, ((of_points, joint), (of_nodes, _)) in enumerate(self.joints):
-            of = self.row_of_joint(k, at_points[:, of_points], joint)
+            of = self.row_of_joint(k, at_points[:, of_points], traction[:, of_points], joint)
             of["max_opening"] = at_nodes[:, of_nodes, 0].max(axis=1)
             row |= {column_of(name, k): values for name, values in of.items()}
         return row
 
-    def row_of_joint(self, number: int, jumps: Array, sides: list[Alike]) -> dict[str, Array]:
-        """Those of a joint, by its number, at jumps (sides, q, 3) of its Gauss points."""
+    def row_of_joint(
+        self, number: int, jumps: Array, traction: Array, sides: list[Alike]
+    ) -> dict[str, Array]:
+        """Those of a joint, by its number, at jumps and tractions (sides, q, 3) of its points."""
         base = self.sides.model.equilibrium
         joint = base.interface.joints[number]
         chord, weights = joint.chord, joint.points.weights / joint.width
-        traction = np.empty_like(jumps)
         bonded, opening = np.empty(jumps.shape[:2]), np.empty(jumps.shape[:2])
         for alike in sides:
             law, flat = alike.law, jumps[alike.sides].reshape(-1, 3)
             shape = len(alike.sides), len(weights)
-            traction[alike.sides] = alike.response(jumps[alike.sides], alike.points)[0]
             bonded[alike.sides] = law.cohesion_left(flat, alike.points).reshape(shape)
             of_crack = law.opening_of_crack(alike.points, len(flat))
             opening[alike.sides] = of_crack.reshape(shape)

@@ -86,7 +86,10 @@ OF_BODIES = (
 )
 
 #: Parameters with which the bodies are condensed anew, so that each takes seconds: by name only.
-CONDENSED = "nu", "nu_dam", "nu_found"
+CONDENSED = "nu", "nu_dam", "nu_found", "ice_level", "anchor_at"
+
+#: Parameters of which one follows from the other if that is given.
+ALTERNATIVES = "G_f", "pena_rupture"
 
 #: Groups of parameters without an effect on a run, but for some of them.
 WITHOUT_EFFECT, BUT = ("Earthquake", "Checks"), ("factor_mu", "factor_c")
@@ -184,7 +187,9 @@ def all_of(case: Case) -> list[str]:
         differs = known.of_joints and len({joint[name] for joint in case.joints}) > 1
         for one in [f"{j}.{name}" for j in case.joint_names] if differs else [name]:
             with contextlib.suppress(InputError):  # it follows from others
-                half_difference(case, one)
+                value, *_ = half_difference(case, one)
+                if name in ALTERNATIVES:
+                    varied(case, {one: value})
                 names.append(one)
     return names
 
