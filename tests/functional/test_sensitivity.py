@@ -213,7 +213,8 @@ def test_all_parameters_of_a_law_whose_energy_is_given_twice(given):
     case = dj.case("dam", levels=[20], steps=1, **coarse, **lifts, **given)
     names = sensitivity.all_of(case)
     found = {"G_f", "pena_rupture"} & {name.rpartition(".")[2] for name in names}
-    assert found == set(given or ("G_f", "pena_rupture"))
+    expected = set(given or ("G_f", "pena_rupture"))
+    assert found == expected
     rows = {row.name: row.derivatives for row in sensitivity.of_run(case, names)}
     assert set(names) - rows.keys() <= {"saw_thickness"}  # a kink
     assert rows["lift 12 m.K_N"]["max_opening_2"] != 0

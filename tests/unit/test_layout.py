@@ -52,7 +52,7 @@ def test_sections_that_the_code_names_exist():
 def test_no_assertion_has_alternatives():
     for path in (ROOT / "tests").rglob("*.py"):
         asserted = [n for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Assert)]
-        assert not [m.lineno for n in asserted for m in ast.walk(n) if isinstance(m, ast.Or)], path
+        assert not [n.lineno for n in asserted for m in ast.walk(n) if isinstance(m, ast.Or)], path
 
 
 @pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda p: str(p.name))
