@@ -9,6 +9,8 @@ from damjoint.engines.getdp import solve as getdp
 from damjoint.input.resolve import load
 from damjoint.joint.interface import interface_of
 from damjoint.mesh.mesh import mesh_of
+from damjoint.model.fields import Solution
+from damjoint.pictures.run_picture import PER_JOINT, picture
 from damjoint.post.summary import joints_note, joints_table
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.notes import notes
@@ -245,6 +247,9 @@ def test_each_block_of_a_dam_across_a_valley_is_in_equilibrium():
     assert len(total) == 9
     for name in set(total) - {"foundation"}:
         assert np.abs(total[name]).max() < 1e-6 * weight
+    # without fields a row of curves for each joint, not fifteen in the height of one
+    figure = picture(Solution(results, {}, {}), ())
+    assert figure.get_figheight() > len(results.joints) * PER_JOINT
 
 
 @pytest.mark.parametrize("order", [1.0, 2.0])

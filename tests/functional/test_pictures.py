@@ -403,8 +403,8 @@ def test_a_narrow_map_has_a_single_tick():
 
 
 def test_the_surface_of_the_reservoir_ends_at_dam_and_ground():
-    """A valley 1:1 whose bottom is along x, a dam from x = 0 on: at a level of 5 m the water is
-    10 m wide and ends at the dam.
+    """A valley 1:1 whose bottom is along x, a dam from x = 0 on: at a level of 4.7 m the water is
+    9.4 m wide and ends at the dam.
     """
     x, z = np.meshgrid(np.linspace(-20, 20, 41), np.linspace(-10, 10, 41))
     points = np.column_stack([x.ravel(), np.abs(z).ravel(), z.ravel()])
@@ -412,10 +412,14 @@ def test_the_surface_of_the_reservoir_ends_at_dam_and_ground():
     quads = np.stack([corners[:-1, :-1], corners[:-1, 1:], corners[1:, 1:], corners[1:, :-1]], -1)
     ground = Body(points, np.arange(len(points)), [("quad", quads.reshape(-1, 4))], np.arange(1600))
     dam = Body(np.array([(0.0, 0, 0), (5, 0, 0)]), np.arange(2), [], np.arange(0))
-    cells = water_surface({"foundation": ground, "dam": dam}, 5.0)
-    assert_allclose(cells[:, :, 1], 5.0)
-    assert cells[:, :, 0].max() == pytest.approx(0) and cells[:, :, 0].min() == pytest.approx(-20)
-    assert np.ptp(cells[:, :, 2]) == pytest.approx(10, abs=1.7)
+    cells = water_surface({"foundation": ground, "dam": dam}, 4.7)
+    corners = np.concatenate(cells)
+    assert_allclose(corners[:, 1], 4.7)
+    assert corners[:, 0].max() == pytest.approx(0) and corners[:, 0].min() == pytest.approx(-20)
+    # its banks are straight, between the lines of the grid
+    shores = [cell[np.abs(cell[:, 2]) > 4.7 - 1e-9] for cell in cells]
+    assert max(np.abs(shore[:, 2]).max(initial=0) for shore in shores) == pytest.approx(4.7)
+    assert sum(np.ptp(shore[:, 0]) for shore in shores if len(shore)) == pytest.approx(40)
     assert len(water_surface({"foundation": ground, "dam": dam}, -1.0)) == 0
 
 

@@ -135,7 +135,7 @@ def picture(solution: Solution, halves: tuple[int, ...] = (0, 1)) -> Figure:
     head = TITLE * len(title) + MESSAGE * (len(facts) + len(message)) + 0.05
     heights = [head]
     if has_states:
-        rows = len(result.joints) * PER_JOINT if several and not is_user_solid(case) else 0.0
+        rows = len(result.joints) * PER_JOINT if several and not has_maps(solution) else 0.0
         middle = max(HEIGHT - head - HISTORY, rows)
         heights += [middle, max(HISTORY, several * (1 + len(result.joints)) * TABLE_ROW)]
         if case["dim"] == 3 and solution.fields and not is_user_solid(case):
@@ -209,11 +209,16 @@ def shear_limit(case: Case, rows: dict[str, np.ndarray]) -> tuple[str, np.ndarra
     return f"limit: {law.shear_strength_formula}{hardening}", strength
 
 
-def draw_joint(figure: AnyFigure, solution: Solution, time: float) -> None:
-    """Draw the only joint of a solution: curves along it, or maps where it is a surface of any
-    shape (without fields its mesh is not known).
+def has_maps(solution: Solution) -> bool:
+    """Whether the joints are drawn as maps, not as curves: surfaces of any shape (without fields
+    their mesh is not known).
     """
-    if solution.fields and is_user_solid(solution.result.case):
+    return bool(solution.fields) and is_user_solid(solution.result.case)
+
+
+def draw_joint(figure: AnyFigure, solution: Solution, time: float) -> None:
+    """Draw the only joint of a solution: curves along it or maps."""
+    if has_maps(solution):
         draw_maps(figure, solution, time)
     else:
         axes = panels(figure, 3, 1, bottom=0.62, top=0.28, down=0.32)[:, 0]
@@ -228,7 +233,7 @@ def draw_all_joints(figure: AnyFigure, solution: Solution, time: float) -> None:
     joints = solution.result.joints
     if len(joints) == 1:
         draw_joint(figure, solution, time)
-    elif solution.fields and is_user_solid(solution.result.case):
+    elif has_maps(solution):
         draw_openings(figure, solution, time)
     else:
         grid = panels(
@@ -571,15 +576,18 @@ def draw_view(figure: AnyFigure, solution: Solution, time: float) -> None:
         near += [places] if name != "foundation" else []
         for table, _ in skin(body):
             polygons += list(places[table, :2])
-            depths.append(places[table, 2].mean(axis=1))
+            away = places[table, 2]
+            # the ground by its farthest corner: the water lies on it
+            depths.append(away.min(axis=1) if name == "foundation" else away.mean(axis=1))
             values.append(sizes[name][table].mean(axis=1) * factor)
     state = solution.result.state(time)
-    water = water_surface(solution.bodies, state["level"]) @ VIEW
-    order = np.argsort(np.concatenate([*depths, water[:, :, 2].mean(axis=1)]))
-    polygons += list(water[:, :, :2])
+    water = [cell @ VIEW for cell in water_surface(solution.bodies, state["level"])]
+    depths.append(np.array([cell[:, 2].mean() for cell in water]))
+    order = np.argsort(np.concatenate(depths))
+    polygons += [cell[:, :2] for cell in water]
     colors = ScalarMappable(cmap="YlGnBu")
     shades = colors.to_rgba(np.concatenate(values))
-    shades = np.concatenate([shades, np.tile(to_rgba(WATER, 0.45), (len(water), 1))])
+    shades = np.concatenate([shades, np.full((len(water), 4), to_rgba(WATER, 0.45))])
     edges = [to_rgba(GREY)] * (len(shades) - len(water)) + [to_rgba(WATER, 0.0)] * len(water)
     (axes,) = panels(figure, left=0.15, right=0.85, bottom=0.15, top=0.3).flat
     faces = PolyCollection([polygons[i] for i in order])  # the nearest are drawn last
@@ -635,7 +643,7 @@ def draw_openings(figure: AnyFigure, solution: Solution, time: float) -> None:
     openings = [np.maximum(row["delta_n"], 0.0) * factor for row in rows]
     largest = max(np.percentile(opening, SCALED[1]) for opening in openings) or 1.0
     shape = (math.ceil(len(joints) / across), across)
-    grid = panels(figure, *shape, left=0.3, right=0.7, bottom=0.3, top=0.5, across=0.25, down=0.35)
+    grid = panels(figure, *shape, left=0.3, right=0.7, bottom=0.3, top=0.5, across=0.4, down=0.35)
     for number, axes in enumerate(grid.flat):
         if number >= len(joints):
             axes.remove()

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from contourpy import FillType, contour_generator
 
 from .. import ROUND_OFF
 from ..arrays import Array, IntArray, Table
@@ -363,34 +364,56 @@ class Scene:
 
 #: Cells of the reservoir's surface along its shorter side.
 CELLS = 24
+#: Part of a triangle's side by which a place beside it is in it [-].
+INSIDE = 1e-6
 
 
-def water_surface(bodies: Mapping[str, Body], level: float) -> Array:
-    """Quadrangles (n, 4, 3) of the reservoir's surface, upstream of the dam, above the ground."""
-    ground = bodies["foundation"]
+def water_surface(bodies: Mapping[str, Body], level: float) -> list[Array]:
+    """Polygons (n, 3) of the reservoir's surface, upstream of the dam, up to the banks."""
+    ground = bodies["foundation"].points
     dam = np.concatenate([b.points for n, b in bodies.items() if n.split(" ")[0] == "dam"])
-    tops = []
-    for table, _ in skin(ground):
-        corners = ground.points[table]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        upwards = np.abs(normal[:, 1]) > ROUND_OFF * np.linalg.norm(normal, axis=1)
-        tops.append(corners[upwards].mean(axis=1))
-    top = np.concatenate(tops)
-    (left, _, back), (_, _, front) = ground.points.min(axis=0), ground.points.max(axis=0)
+    (left, _, back), (_, _, front) = ground.min(axis=0), ground.max(axis=0)
     right = dam[:, 0].min()
-    size = min(dam[:, 0].min() - left, front - back) / CELLS
-    if size <= 0 or level <= ground.points[:, 1].min():
-        return np.zeros((0, 4, 3))
-    xs, zs = (
-        np.linspace(a, b, 1 + round((b - a) / size)) for a, b in ((left, right), (back, front))
+    size = min(right - left, front - back) / CELLS
+    if size <= 0 or level <= ground[:, 1].min():
+        return []
+    x, z = (np.linspace(a, b, 1 + round((b - a) / size)) for a, b in ((left, right), (back, front)))
+    places = np.stack(np.meshgrid(x, z), axis=-1)
+    heights = ground_heights(bodies["foundation"], places.reshape(-1, 2)).reshape(len(z), len(x))
+    generator = contour_generator(
+        *(x, z, heights), fill_type=FillType.ChunkCombinedOffset, chunk_size=1
     )
-    x, z = (v.ravel() for v in np.meshgrid((xs[1:] + xs[:-1]) / 2, (zs[1:] + zs[:-1]) / 2))
-    heights = np.empty(len(x))
-    for i, place in enumerate(np.column_stack([x, z])):
-        near = ((top[:, [0, 2]] - place) ** 2).sum(axis=1)
-        heights[i] = top[near < 1.01 * near.min() + size**2 / 16, 1].max()
-    wet = heights < level
-    half = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) / 2 * [xs[1] - xs[0], zs[1] - zs[0]]
-    cells = np.full((int(wet.sum()), 4, 3), level)
-    cells[:, :, [0, 2]] = np.column_stack([x, z])[wet][:, None] + half
-    return cells
+    cells = generator.filled(heights.min() - size, level)[0]  # a chunk for each cell of the grid
+    return [
+        np.column_stack([cell[:-1, 0], np.full(len(cell) - 1, level), cell[:-1, 1]])
+        for cell in cells
+        if cell is not None
+    ]
+
+
+def area_between(first: Array, second: Array) -> Array:
+    """Area (n,) of the parallelograms of vectors (n, 2), > 0 if the second is to the left."""
+    return first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+
+
+def ground_heights(ground: Body, places: Array) -> Array:
+    """Height of the top of the ground at places (n, 2): x, z. Between its nodes it is linear."""
+    halves = [
+        ground.points[table[:, [0, k, k + 1]]]
+        for table, _ in skin(ground)
+        for k in range(1, table.shape[1] - 1)
+    ]
+    triangles = np.concatenate(halves)
+    flat = triangles[:, :, [0, 2]]
+    first, second = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
+    area = area_between(first, second)
+    lying = np.abs(area) > ROUND_OFF * (first**2 + second**2).sum(axis=1)  # others are vertical
+    start, first, second, area = (values[lying] for values in (flat[:, 0], first, second, area))
+    corners = triangles[lying, :, 1]
+    heights = np.empty(len(places))
+    for i, place in enumerate(places):
+        u, v = area_between(place - start, second) / area, area_between(first, place - start) / area
+        inside = np.minimum(np.minimum(u, v), 1 - u - v) > -INSIDE
+        parts = np.column_stack([1 - u - v, u, v])[inside]
+        heights[i] = (parts * corners[inside]).sum(axis=1).max(initial=ground.points[:, 1].min())
+    return heights
