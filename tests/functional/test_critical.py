@@ -23,7 +23,7 @@ from damjoint import RunError, runner
 from damjoint.input.resolve import load, varied
 from damjoint.solver import path
 from damjoint.statics import gravity
-from damjoint.statics.verdict import highest_by_statics
+from damjoint.statics.verdict import highest_by_statics, verdict
 from damjoint.studies import failure_path
 from damjoint.studies.critical import Search
 from damjoint.studies.critical_study import critical, printed_lines, table
@@ -405,6 +405,17 @@ def test_bad_input_is_refused(command, tmp_path, words, message):
     code, _, err = command("critical", "c", *words)
     assert code == 2 and message in err and len(err.splitlines()) == 1
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.heavy
+def test_a_limit_point_confirms_another_quantity_than_the_level(solve):
+    """The path with a lighter dam falls before any mechanism; shorter increments do the same."""
+    settings = {"law": "rupture", "uplift": "cracked", "n_joint": 10.0}
+    _, answer = search_result("dam", "rho_dam", settings, "30,42")
+    assert answer.confirmed and answer.why.startswith("there the level has a limit point")
+    for factor, stands in ((1.003, True), (0.997, False)):
+        (run,) = solve("dam", "30,42", **settings, rho_dam=factor * answer.value)
+        assert (verdict(run) == "stands") is stands
 
 
 def test_values_up_to_the_last_that_the_case_allows_are_tried():

@@ -314,15 +314,10 @@ class Search:
             mode = "unstable crack growth" if after else result.mode
             result = replace(result, mode=mode, why=beyond_limit(path), doubt="", after=after)
             result = replace(result, growth=point.level)
-        elif not result.why and path.ends_at_strength:
-            result = replace(result, mode="sliding", why=slips_whole(path), doubt="")
-        elif not result.why and path.falls:
-            result = replace(result, why=lost_beyond_limit(path), doubt="")
-        elif not result.why and path.stops and path.loses_drains:
-            result = replace(result, doubt=end_at_drains(path))
-        elif not result.why and path.stops:
-            result = replace(result, why=end_of_branch(path), doubt="")
-            if path.entering and certain:  # each point that the water reaches turns the path
+        elif not result.why:
+            result = with_end_of(path, result)
+            ends_in_crack = path.entering and result.why == end_of_branch(path)
+            if ends_in_crack and certain:  # each point that the water reaches turns the path
                 other = self.from_beginning(path, share=1.0, case=lower_begin(path.case))
                 certain = other is None
         if path.begun_by_run and point is path.points[0]:
@@ -437,7 +432,7 @@ class Search:
                 point, path = point_at_target(stands), stands.path
                 assert path.arrival is not None
                 growth = path.growth_until(path.arrival + 1)  # on the way to the target
-                return replace(self.result(stands.value, fails.path, point), growth=growth)
+                return replace(self.result_beyond(fails.path, stands.value, point), growth=growth)
             self.factor = SURE  # the first estimate is wrong for this dam
             ends = self.beyond(fails, fails.value - stands.value)
             if ends is None:
@@ -635,6 +630,16 @@ class Search:
         doubt = "" if why else doubt
         return CriticalValue(value, mode, why, doubt, point, joint=joint, events=events)
 
+    def result_beyond(self, failing: FailurePath, value: float, point: Point) -> CriticalValue:
+        """The result for a value and the path that fails just beyond it, for another quantity than
+        the level. An end before any unstable growth confirms it, if shorter increments find it too.
+        """
+        result = self.result(value, failing, point)
+        if result.why or any(start <= failing.top for start in failing.starts):
+            return result
+        ended = with_end_of(failing, result)
+        return ended if ended.why and self.repeated(failing) is None else result
+
     def by_statics(self, failing: FailurePath) -> tuple[str, str, str]:
         """How an unconfirmed path fails, why, and at which joint, if there are several: its
         resultants have no equilibrium above a level near its highest (below the target, for another
@@ -649,6 +654,17 @@ class Search:
             f"highest computed level is {top.level:.6g} m"
         )
         return mode, why, joint
+
+
+def with_end_of(path: FailurePath, result: CriticalValue) -> CriticalValue:
+    """A result that no mechanism confirms, with what the end of its path says."""
+    if path.ends_at_strength:
+        return replace(result, mode="sliding", why=slips_whole(path), doubt="")
+    if path.falls:
+        return replace(result, why=lost_beyond_limit(path), doubt="")
+    if path.stops and path.loses_drains:
+        return replace(result, doubt=end_at_drains(path))
+    return replace(result, why=end_of_branch(path), doubt="") if path.stops else result
 
 
 def lower_begin(case: Case) -> Case:
