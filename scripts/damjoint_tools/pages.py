@@ -188,7 +188,7 @@ def results_page() -> str:
         "- `.png`: a chart of one or two varied parameters, or of the sample.",
         "## sensitivity.csv",
         "Written by `damjoint run --sensitivity`, `check` and `critical`, a row per parameter and "
-        "level: `parameter`, its `unit` and `value`, the level [m], `kink` (1: a "
+        "level: `parameter`, its `unit` and `value`, the time and the level [m], `kink` (1: a "
         "point of the joint is about to open, to slip or to break, and the derivative towards the "
         "other side differs), `of_runs` (1: of the geometry, by two runs), and the derivatives, in "
         "SI units per unit of the parameter, of columns of history.csv, of `SSF`, `OSF` and of "

@@ -349,13 +349,14 @@ def test_the_table_of_a_run(command, tmp_path):
     code, out, _ = command(*words, "--out", "one", "--sensitivity", "rho_dam,E_dam,f_c")
     assert code == 0 and "Change by one percent more of a parameter" in out
     table = rows_of(tmp_path / "one/sensitivity.csv")
-    assert [(r["parameter"], r["level"]) for r in table] == [
-        (name, level) for name in ("rho_dam", "E_dam", "f_c") for level in ("20", "30")
+    assert [(r["parameter"], r["time"], r["level"]) for r in table] == [
+        (name, *at) for name in ("rho_dam", "E_dam", "f_c") for at in (("1", "20"), ("2", "30"))
     ]
     assert float(table[0]["N"]) == pytest.approx(9.81 * 45 * (34 + 5) / 2, rel=1e-6)
     lines = out.splitlines()
     assert any(line.startswith("E_dam") for line in lines)
-    assert not any(line.startswith("f_c") for line in lines)  # has no effect
+    assert not any(line.startswith("f_c") for line in lines)
+    assert "sensitivity: no effect of f_c" in lines
     assert command(*words, "--out", "one")[0] == 0
     assert not (tmp_path / "one/sensitivity.csv").exists()
 

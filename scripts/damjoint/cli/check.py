@@ -68,6 +68,6 @@ def changes_of(cases: Sequence[Case], out: Path, width: int | None) -> list[str]
         case = next(case for case in cases if case.name == scene.name)
         info = folders.read_info(folders.scene_folder(case, scene, out / case.name)) or {}
         if derived := info.get("sensitivity"):
-            words = derived["statement"] or sensitivity.text(derived["changes"], width)
+            words = sensitivity.words(derived, width)
             texts.append(f"{scene.name}, uplift {scene['uplift']}:\n{words}")
     return texts

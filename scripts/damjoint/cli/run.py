@@ -83,11 +83,7 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
         if result.last:
             say(f"\n{summary.text(result, table_width(arguments))}")
         if derived := result.info.get("sensitivity"):
-            say(
-                "",
-                derived["statement"]
-                or sensitivity.text(derived["changes"], table_width(arguments)),
-            )
+            say("", sensitivity.words(derived, table_width(arguments)))
         lines = [stiffness.meaning(result.case) if result.last else "", *hints(result)]
         lines.append(result.info.get("error_estimate", {}).get("statement", ""))
         if any(lines):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from textwrap import wrap
+from typing import Any
 
 import numpy as np
 
@@ -108,6 +109,7 @@ class Sensitivity:
 
     name: str
     value: float
+    time: float
     level: float
     derivatives: Mapping[str, float]
     kink: bool
@@ -219,7 +221,7 @@ def of_run(case: Case, names: Sequence[str]) -> list[Sensitivity]:
         for k, name in enumerate(direct):
             value, *_ = half_difference(stepper.case, name)
             for number, (last, of) in enumerate(zip(ends, rates, strict=False)):
-                level = updates[last].state.loading.level
+                state = updates[last].state
                 row, kink = row_at(of, k, columns), False
                 if of.kink[k]:
                     other = row_at(larger[number], near.index(name), columns)
@@ -227,7 +229,8 @@ def of_run(case: Case, names: Sequence[str]) -> list[Sensitivity]:
                     kink = differ(row, other, noise)
                     row = other if kink else row
                 if row:
-                    rows.append(Sensitivity(name, value, float(level), row, kink))
+                    at = float(state.time), float(state.loading.level)
+                    rows.append(Sensitivity(name, value, *at, row, kink))
         for name in others:
             rows += of_two_runs(stepper, name, columns)
     return rows
@@ -299,6 +302,7 @@ def of_two_runs(stepper: LoadStepper, name: str, columns: Sequence[str]) -> list
         Sensitivity(
             name,
             value,
+            low["time"],
             low["level"],
             {
                 column: (high[column] - low[column]) / (2 * OF_GEOMETRY * value)
@@ -335,7 +339,8 @@ def of_point(point: Point, names: Sequence[str]) -> list[Sensitivity]:
             value, *_ = half_difference(point.model.case, name)
             given = {"critical_level": float(end.level[k])}
             if np.isfinite(end.level[k]):
-                rows.append(Sensitivity(name, value, float(point.level), given, bool(end.kink[k])))
+                at = float(point.state.time), float(point.level)
+                rows.append(Sensitivity(name, value, *at, given, bool(end.kink[k])))
     if not rows:
         raise RunError(f"sensitivity: no derivative with {', '.join(names)} is found, at a kink")
     return rows
@@ -348,6 +353,7 @@ def table(rows: Sequence[Sensitivity]) -> dict[str, list[Value]]:
         "parameter": [row.name for row in rows],
         "unit": [row.unit for row in rows],
         "value": [row.value for row in rows],
+        "time": [row.time for row in rows],
         "level": [row.level for row in rows],
         "kink": [float(row.kink) for row in rows],
         "of_runs": [float(row.of_runs) for row in rows],
@@ -369,13 +375,15 @@ def write(
     try:
         rows = of_run(results.case, names)
     except RunError as error:
-        results.info["sensitivity"] = {"statement": str(error), "changes": []}
+        results.info["sensitivity"] = {"statement": str(error), "changes": [], "without": []}
         return
     write_csv(folder / FILE, {n: np.array(v) for n, v in table(rows).items()})
     sizes = {n: abs(v) for n, v in results.last.items()}
     listed = changes(rows, printed, sizes, deviations)
-    statement = "" if listed else no_effect(deviations or names)
-    results.info["sensitivity"] = {"statement": statement, "changes": listed}
+    found = {row["parameter"] for row in listed}
+    without = [name for name in deviations or names if name not in found]
+    statement = "" if listed else no_effect(without)
+    results.info["sensitivity"] = {"statement": statement, "changes": listed, "without": without}
     if picture and listed:
         draw_changes(listed, results.case, rows[-1].level, folder)
 
@@ -383,6 +391,16 @@ def write(
 def no_effect(names: Iterable[str]) -> str:
     """What is printed of parameters if none of them has an effect."""
     return f"sensitivity: no effect of {', '.join(names)}"
+
+
+def words(derived: Mapping[str, Any], width: int | None = None) -> str:
+    """What is printed of the derivatives in the info of a run: the changes, and which parameters
+    have no effect; width: of the terminal, None: all columns.
+    """
+    if derived["statement"]:
+        return str(derived["statement"])
+    without = derived.get("without", [])
+    return text(derived["changes"], width) + (f"\n{no_effect(without)}" if without else "")
 
 
 def draw_changes(
