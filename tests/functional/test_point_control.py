@@ -5,6 +5,7 @@ import pytest
 from damjoint import InputError, runner
 from damjoint.input.resolve import load
 from damjoint.mesh.mesh import mesh_of
+from damjoint.post import summary
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.statement import path_statement
 from damjoint.verification import path_tests
@@ -56,6 +57,10 @@ def test_the_unknown_load_leads_to_the_prescribed_displacement(solve, of, dim):
     known = settings | {name: factor * value for name, value in full.items()} | {"drive": "level"}
     (given,) = solve("dam", f"30,{level!r}", **known)
     same_columns(driven, given)
+    shown = summary.levels_table(driven)
+    assert ("point movement" in shown.names, f"{of} factor" in shown.names) == (True, of != "level")
+    if of != "level":
+        assert f"{factor:.4g}" == shown.rows[-1][0]
     assert driven.last["crack_length"] == pytest.approx(given.last["crack_length"])
 
 

@@ -60,11 +60,8 @@ class JointFields:
         #: joint extends, and fields at the locations of its space, from their values at the nodes;
         #: the nodes whose pressure may be unknown
         self.at_points = points.values
-        self.axes = [
-            axis
-            for axis, g in enumerate(points.gradients[: joint.dim])
-            if np.abs(g.data).max() > 1e-12
-        ]
+        steepest = [np.abs(g.data).max() for g in points.gradients[: joint.dim]]
+        self.axes = [axis for axis, g in enumerate(steepest) if g > ROUND_OFF * max(steepest)]
         self.slopes = [points.gradients[axis] for axis in self.axes]
         self.at_locations = space.interpolation(1)
         self.ends = np.concatenate([heel, toe])

@@ -34,6 +34,7 @@ SHOWN: tuple[tuple[str, str, Units], ...] = (
     ("crest_ux", "crest movement", LENGTHS),
     ("flux", "leakage", FLUXES),
 )
+NUMBER: Units = (("", 1.0),)
 
 
 class Table(NamedTuple):
@@ -88,13 +89,19 @@ def levels_table(result: Results, displacements: Units | None = None) -> Table:
     rows = requested_rows(result)
     # a joint that is closed everywhere has its "largest opening" below 0
     history = history | {"max_opening": np.maximum(history["max_opening"], 0)}
-    times: list[tuple[str, np.ndarray, Units]] = []
+    first: list[tuple[str, np.ndarray, Units]] = []
     if flows_in_time(case):
         after = history["time"][rows] - case["time_start"]
         seconds = np.where(after > -ROUND_OFF, after * case["time_unit"], np.nan)
-        times = [("time", seconds, (unit_of_time(np.nanmax(seconds, initial=0.0)),))]
+        first = [("time", seconds, (unit_of_time(np.nanmax(seconds, initial=0.0)),))]
+    if case["drive"] != "level":
+        if case["drive_load"] != "level":
+            first.append((f"{case['drive_load']} factor", history["load_factor"][rows], NUMBER))
+        if "point_u" in history:
+            moved = history["point_u"][rows]
+            first.append(("point movement", moved, units_shown(LENGTHS, displacements)))
     names, sizes, cells = table_of(
-        times
+        first
         + [
             # one unit of forces in all tables
             (head, history[name][rows], units_shown(units, displacements))
@@ -132,7 +139,7 @@ def joints_table(result: Results, time: float) -> Table:
     """
     joints = [(joint_result, joint_result.state(time)) for joint_result in result.joints]
     factors = [sliding_factor(joint_result, state) for joint_result, state in joints]
-    columns: list[tuple[str, np.ndarray, Units]] = [("SSF", np.array(factors), (("", 1.0),))]
+    columns: list[tuple[str, np.ndarray, Units]] = [("SSF", np.array(factors), NUMBER)]
     for name, head in OF_JOINTS:
         values = np.array([state[name] for _, state in joints])
         if name != "process_zone" or values.any():
@@ -181,7 +188,10 @@ def text(result: Results, width: int | None = None) -> str:
     table = joints_table(result, last["time"])
     shown = aligned(table.rows, table.stacked, left=1)
     note = joints_note(case)
-    joints = f"joints at level {last['level']:.4g} m:\n{shown}" + (f"\n{note}" if note else "")
+    at = f"level {last['level']:.4g} m"
+    if case["drive"] != "level" and case["drive_load"] != "level":
+        at += f", {case['drive_load']} factor {last['load_factor']:.4g}"
+    joints = f"joints at {at}:\n{shown}" + (f"\n{note}" if note else "")
     if width is not None:
         return joints
     tables = zip(case.joint_names, map(text_of_joint, result.joints), strict=True)
