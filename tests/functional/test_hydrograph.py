@@ -83,6 +83,8 @@ def test_a_flood_with_picture_and_report(command, tmp_path, monkeypatch, texts_d
     ):
         most, at = factor * rows[name].max(), hours[rows[name].argmax()]
         assert f"{text}: {most:.4g} {unit} at {at:.4g} h" in page
+    end = f"{rows['p_max'][-1] / 1e3:.4g} kPa, more than the {reservoir[-1] / 1e3:.4g} kPa outside"
+    assert f"At the end it is up to {end}: water that has not yet left" in page
     assert "none flows into rock or concrete" in page and "smooth faces" not in page
     limits = list(report_input.limits(load("flood", {"turbulent": 1.0})))
     assert sum("beyond a Reynolds number of 2041 turbulent" in line for line in limits) == 1

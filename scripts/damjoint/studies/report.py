@@ -54,6 +54,8 @@ from .report_studies import StudySection
 HALF, WIDE, SOLID = (5.2, 4.9), (10.6, 2.1), (10.6, 4.4)
 #: That of the stress, and height of the curves of one of several joints.
 STRESS, PER_JOINT = (10.6, 4.2), 1.35
+#: Highest pressure in a joint over that of the water outside, above which water is shut in [-].
+SHUT_IN = 1.01
 MINUTE = "%Y-%m-%d %H:%M"
 #: A column for `table_of`: heading, values, units.
 Column = tuple[str, np.ndarray, Units]
@@ -404,12 +406,21 @@ def water_of(result: Results, name: str) -> str:
     def at_most(column: str) -> str:
         return f"at {seconds[rows[column].argmax()] * factor:.4g} {hours}"
 
+    head = max(last["level"] + case["joint_head_offset"], last["tail_level"])
+    height = head - result.joint["y"].min()
+    outside, inside = case["rho_water"] * case["g"] * max(height, 0) / 1e3, last["p_max"] / 1e3
+    shut_in = (
+        f" At the end it is up to {inside:.4g} kPa, more than the {outside:.4g} kPa outside: water "
+        "that has not yet left the joint as it closed."
+        if inside > SHUT_IN * outside
+        else ""
+    )
     return (
         f"Water in {name} at the end: {litres('water')}, of which {litres('water_in')} have come "
         f"in; void {litres('void')}. "
         f"Most water: {1e3 * most:.4g} l/m {at_most('water')}; highest pressure: "
         f"{rows['p_max'].max() / 1e3:.4g} kPa {at_most('p_max')}; largest Reynolds number: "
-        f"{rows['Re'].max():.3g} {at_most('Re')}."
+        f"{rows['Re'].max():.3g} {at_most('Re')}.{shut_in}"
     )
 
 
