@@ -454,9 +454,10 @@ def test_a_fracture_that_its_pressure_widens():
         step = TimeStep(seconds=100 / steps, begin=slot.stored)
         for _ in range(3):  # the conductivity follows the pressure
             wider = (1 + fields.at_points @ pressure / stiffness / width) ** 3
-            conductivity = wider * system.flow.points.weights
-            solution = system.solve_in_time(
-                step, closed, conductivity, heads, heads, none.astype(int), none
+            conductivity = system.reference * wider * system.flow.points.weights
+            widths = [water.aperture(closed, None)[0] for water in system.members]
+            solution = system.flow_in_time(step, widths, heads, heads, none.astype(int), none)(
+                conductivity
             )
             pressure = heads + system.expand_to_nodes(solution)
         slot.stored = solution.stored(0.0, slot.stored)

@@ -1,10 +1,16 @@
 """quake_uplift = transient: flow of the water and motion of the dam solved together."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from damjoint.dynamics import checkpoint
 from damjoint.dynamics.history import QuakeHistory
 from damjoint.dynamics.step import lift
+from damjoint.input.resolve import load
+from damjoint.solver.controls import LevelControl
+from damjoint.solver.model import Model
+from damjoint.studies.quake import static_step
 from quakes import DAM, earthquake, mean_slip, smooth_record
 
 #: Water with a little air in a joint of 0.05 mm, on the dam that slides and rocks.
@@ -130,3 +136,21 @@ def test_refused(command, record, words, message):
     ]
     code, out, error = command("quake", "dam", "--record", str(record), *settings)
     assert (code, out) == (2, "") and len(error.splitlines()) == 1 and message in error, error
+
+
+def test_a_dam_that_floats_after_an_earthquake_finds_its_static_state():
+    """Its joint is open by 5 mm throughout: from there, Newton's method has no contact."""
+    coarse = {"n_joint": 10.0, "h_dam": 6.0, "h_found": 12.0}
+    model = Model(load("dam", WET | coarse | {"law": "friction", "adhesion": 0.0}, (20.0,)))
+    step = model.advance(model.start(), 1.0, LevelControl(20.0))
+    assert step
+    rest, interface = step.state, model.equilibrium.interface
+    opening = interface.at_points.toarray()[::2]
+    apart = np.full(len(opening), 5e-3) - opening @ rest.jump
+    floating = replace(rest, jump=rest.jump + np.linalg.lstsq(opening, apart)[0])
+    assert (opening @ floating.jump > 4e-3).all()
+    assert not model.advance(floating, floating.time, LevelControl(20.0))
+    found = static_step(model, floating)
+    assert found
+    # [m], of steps whose residual is 1e-9 of the loads
+    assert found.state.jump == pytest.approx(rest.jump, abs=1e-6 * np.abs(rest.jump).max())

@@ -151,12 +151,16 @@ class TimeStep:
         now, loading = begin.state, begin.state.loading
         start = now.begin_step(equilibrium.laws, now.time)
         water = self.water_in_time(now, start.variables) if self.problem.transient else None
-        lifted = lift(equilibrium, pressure, water)
-        joints = self.joint_problem(begin, start.variables, self.on_jumps(begin, loads, lifted))
-        joints = replace(joints, water=water)
+        lifted = lift(equilibrium, pressure)
+        loaded = self.on_jumps(begin, loads, lifted)
+        joints = self.joint_problem(begin, start.variables, loaded)
         ahead = now.jump + self.dt * begin.retained.velocity[self.jumps]
         both = ((jump, joints.residual(jump, loading)) for jump in (now.jump, ahead))
         guess, residual = min(both, key=lambda pair: float(np.linalg.norm(pair[1].value)))
+        if water:  # that follows the jumps: only the choice of the start is by the pressures so far
+            constant = loaded - lifted + lift(equilibrium, pressure, water)
+            joints = replace(joints, constant=constant, water=water)
+            residual = joints.residual(guess, loading)
         strategies = model.strategies
         if not persist:  # where points stick and slip by turns, only a descent of the residual ends
             strategies = strategies[0], replace(strategies[0], growth=1.0)

@@ -191,6 +191,34 @@ class Pieces:
     #: whether the head of one of these is not known: a branching or a closed end
     join: bool
 
+    @cached_property
+    def leading(self) -> IntArray:
+        """First element of each."""
+        return np.array([cells[0] for cells, _ in self.pieces])
+
+    @cached_property
+    def trailing(self) -> IntArray:
+        """Last element of each."""
+        return np.array([cells[-1] for cells, _ in self.pieces])
+
+    @cached_property
+    def long(self) -> list[tuple[int, IntArray, IntArray]]:
+        """Those of more than one element: number, elements and nodes."""
+        return [(k, *piece) for k, piece in enumerate(self.pieces) if len(piece[0]) > 1]
+
+    @cached_property
+    def nodes(self) -> IntArray:
+        """First and last node of each element along its line (2, elements)."""
+        table = np.empty((2, sum(len(cells) for cells, _ in self.pieces)), int)
+        for cells, nodes in self.pieces:
+            table[:, cells] = nodes[:-1], nodes[1:]
+        return table
+
+    @cached_property
+    def terminals(self) -> IntArray:
+        """Nodes at their ends."""
+        return distinct(self.ends.ravel())
+
 
 @dataclass(frozen=True, kw_only=True)
 class FlowDerivative:
@@ -282,7 +310,7 @@ class Flow:
             self.lines = self._branches() if fields.branched else [self._from_heel_to_toe()]
             self.lengths = np.bincount(points.elements, points.weights)
             #: the lines cut at nodes of known heads, by the bytes of their mask: of the last ones
-            self.cut_lines = lru_cache(maxsize=8)(self._cut_lines)
+            self.cut_lines = lru_cache(maxsize=64)(self._cut_lines)
         #: unit vectors along the lines or towards the toe at the Gauss points
         self.towards = self._along_lines() if fields.branched else self._towards_toe()
         if fields.dim == 3:
@@ -374,10 +402,6 @@ class Flow:
         """2D: of the elements, for conductivities times weights (q,)."""
         by_element = np.bincount(self.points.elements, conductivity)
         return self.lengths**2 / by_element
-
-    def pieces(self, known: BoolArray) -> list[tuple[IntArray, IntArray]]:
-        """2D: elements and nodes of the lines, cut where the heads are known."""
-        return self.cut_lines(known.tobytes()).pieces
 
     def _cut_lines(self, mask: bytes) -> Pieces:
         known, pieces = np.frombuffer(mask, bool), []

@@ -17,12 +17,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
 
-from ..arrays import Array, BoolArray, IntArray, distinct
+from ..arrays import Array, BoolArray, IntArray
 from ..threads import scipy_linalg
 from .flow import Flow, FlowSolution, FlowSystem
 
@@ -127,21 +127,26 @@ class WaterBalance:
     #: height times the water's weight [Pa]; pressure of cavitation [Pa]
     elevation: Array
     lowest: float
-    #: where the search for voids begins (n,)
-    guess: BoolArray
 
     def solve(
-        self, conductivity: Array, imposed: Array, heads: Array, known: BoolArray, dry: BoolArray
+        self,
+        conductivity: Array,
+        imposed: Array,
+        heads: Array,
+        known: BoolArray,
+        dry: BoolArray,
+        guess: BoolArray,
     ) -> FlowInTime:
         """Solve for conductivities w^3/(12 visc) times weights (q,), and heads times the water's
-        weight (n,) [Pa] where they are known; imposed: as in `Flow.solve`; dry: ends of these.
+        weight (n,) [Pa] where they are known; imposed: as in `Flow.solve`; dry: ends of these;
+        guess: where the search for voids begins (n,).
 
         nan if no set of nodes with voids is found.
         """
         seconds, begin = self.step.seconds, self.step.begin
         ground, before = self.storage / seconds, begin.volume
         rest = before - self.volume + self.storage * self.elevation
-        voids, air = self.guess & ~known, self.guess & dry
+        voids, air = guess & ~known, guess & dry
         lacking = np.zeros(len(heads))
         for sets in range(MOST_SETS):
             given, fixed = np.where(voids, self.lowest + self.elevation, heads), known | voids
@@ -261,15 +266,14 @@ class OnLines:
     def __init__(self, flow: Flow, conductivity: Array, ground: Array, known: BoolArray) -> None:
         self.flow, self.known, self.ground = flow, known, ground
         self.conductance = 1 / flow.resistances(conductivity)
-        self.pieces = flow.pieces(known)
-        first, last = self._ends
-        both, number = np.concatenate([first, last]), len(known)
-        self.diagonal = np.asarray(np.bincount(both, np.tile(self.conductance, 2), number), float)
+        self.cut = cut = flow.cut_lines(known.tobytes())
+        both, number = np.concatenate([self.conductance, self.conductance]), len(known)
+        self.diagonal = np.asarray(np.bincount(cut.nodes.ravel(), both, number), float)
         self.missing = np.zeros(len(self.conductance))
         self.gradients: list[Array] = []
-        self.factors, ends, between = [], [], []
+        self.factors, between = [], self.conductance[cut.leading]
         at_ends = np.zeros(len(known))
-        for cells, nodes in self.pieces:
+        for k, cells, nodes in cut.long:
             onward, store = self.conductance[cells].tolist(), ground[nodes].tolist()
             store[0] = store[-1] = 0.0
             mutual, to_first, factors = onward[0], 0.0, []
@@ -283,11 +287,9 @@ class OnLines:
             at_ends[nodes[0]] += to_first
             at_ends[nodes[-1]] += store[-1]
             self.factors.append(factors)
-            ends.append(nodes[[0, -1]])
-            between.append(mutual)
-        pairs = np.array(ends)
-        self.terminals = distinct(pairs.ravel())
-        self.stars = self._stars(pairs, np.array(between), (ground + at_ends)[self.terminals])
+            between[k] = mutual
+        self.terminals = cut.terminals
+        self.stars = self._stars(cut.ends, between, (ground + at_ends)[self.terminals])
 
     def _stars(
         self, pairs: IntArray, between: Array, ground: Array
@@ -313,19 +315,11 @@ class OnLines:
             np.fill_diagonal(mesh, 0)
         return stars
 
-    @cached_property
-    def _ends(self) -> tuple[IntArray, IntArray]:
-        """First and last node of each element along its line."""
-        first, last = (np.empty(len(self.conductance), int) for _ in range(2))
-        for cells, nodes in self.pieces:
-            first[cells], last[cells] = nodes[:-1], nodes[1:]
-        return first, last
-
     def lacking(self, limited: BoolArray, most: Array, elevation: Array) -> Array:
         """See `BalanceMatrix`."""
         if not limited.any():
             return np.zeros(len(elevation))
-        first, last = self._ends
+        first, last = self.cut.nodes
         falls = self.conductance * (elevation[first] - elevation[last])
         upper, number = np.where(falls > 0, first, last), len(elevation)
         downwards = np.asarray(np.bincount(upper, np.abs(falls), number), float)
@@ -338,7 +332,7 @@ class OnLines:
         """See `BalanceMatrix`; of several right sides, too: (n, m) each."""
         total = np.where(self.known if source.ndim == 1 else self.known[:, None], heads, source)
         single, kept = source.ndim == 1, list[list[Any]]()
-        for (_, nodes), factors in zip(self.pieces, self.factors, strict=True):
+        for (_, _, nodes), factors in zip(self.cut.long, self.factors, strict=True):
             inner = list[Any](source[nodes].tolist() if single else source[nodes])
             inner[0] = inner[-1] = 0.0 * inner[0]
             for i, (_, back, ahead) in enumerate(factors, 1):
@@ -356,7 +350,7 @@ class OnLines:
         for k, whole, share in self.stars[::-1]:
             at_ends[k] = at_ends[k] / whole + share @ at_ends
         total[self.terminals] = at_ends
-        for (_, nodes), factors, inner in zip(self.pieces, self.factors, kept, strict=True):
+        for (_, _, nodes), factors, inner in zip(self.cut.long, self.factors, kept, strict=True):
             first, ahead = total[nodes[0]], total[nodes[-1]]
             if single:
                 first, ahead = float(first), float(ahead)
@@ -364,8 +358,7 @@ class OnLines:
                 whole, to_first, to_next = factors[i - 1]
                 ahead = inner[i] / whole + to_first * first + to_next * ahead
                 inner[i] = ahead
-            if factors:
-                total[nodes[1:-1]] = inner[1:-1]
+            total[nodes[1:-1]] = inner[1:-1]
         return total
 
     def outflow(self, total: Array, source: Array) -> Array:
@@ -374,20 +367,20 @@ class OnLines:
         """
         out = source - self.ground * total
         out[self.terminals[self.known[self.terminals]]] = 0
-        largest, flows = LAST_BIT * np.abs(total).max(), np.empty(len(self.conductance))
-        for cells, nodes in self.pieces:
-            conductance, heads = self.conductance[cells], total[nodes]
-            direct = -conductance * np.diff(heads)
+        largest, (first, last) = LAST_BIT * np.abs(total).max(), self.cut.nodes
+        flows = self.conductance * (total[first] - total[last])
+        for _, cells, nodes in self.cut.long:
+            conductance, heads, direct = self.conductance[cells], total[nodes], flows[cells]
             k = int(conductance.argmin())
             flow = np.concatenate([[0.0], np.cumsum(out[nodes[1:-1]])])
             sizes = np.abs(source[nodes[1:-1]]) + self.ground[nodes[1:-1]] * np.abs(heads[1:-1])
             added = flow - flow[k] + direct[k]
             error = conductance[k] * largest + LAST_BIT * sizes.sum()
-            flow = np.where(conductance * largest <= error, direct, added)
-            flows[cells] = flow
-            for end, value in ((nodes[0], flow[0]), (nodes[-1], -flow[-1])):
-                if self.known[end]:
-                    out[end] += value
+            flows[cells] = np.where(conductance * largest <= error, direct, added)
+        cut = self.cut
+        at_ends = np.column_stack([flows[cut.leading], -flows[cut.trailing]]).ravel()
+        at_known = np.bincount(cut.ends.ravel(), at_ends, len(out))
+        out[self.known] += at_known[self.known]
         steepness = -(flows - self.missing) / self.conductance / self.flow.lengths
         at_points = steepness[self.flow.points.elements]
         self.gradients = [at_points * t for t in self.flow.towards]

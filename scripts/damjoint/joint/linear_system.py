@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -99,6 +99,8 @@ class DenseSystem:
     def __init__(self, assembly: Assembly, stiffness: Array) -> None:
         """stiffness: S (j, j)."""
         self.assembly, self.stiffness = assembly, stiffness
+        #: B (j, p), the nodal forces of the pressures of flowing water
+        self.lift = lru_cache(maxsize=1)(lift_of)
 
     def solve(
         self, tangent: Tangent, right: Array, border: Border | None = None
@@ -110,7 +112,7 @@ class DenseSystem:
         """S + K (j, j), as `matrix_of`, faster for few unknowns."""
         matrix = self.stiffness + self.assembly.dense(tangent.law)
         if flow := tangent.flow:
-            matrix[:, flow.columns] -= tangent.lift @ flow.pressure
+            matrix[:, flow.columns] -= self.lift(tangent.flowing) @ flow.pressure
         return matrix
 
 
@@ -122,7 +124,8 @@ class WoodburySystem:
     def __init__(self, assembly: Assembly, stiffness: Array, undamaged: Array) -> None:
         """stiffness: S (j, j); undamaged: tangent (q, 3, 3) of the undamaged joints."""
         self.assembly, self.stiffness, self.undamaged = assembly, stiffness, undamaged
-        self._lift: tuple[tuple[Flow, ...], CsrMatrix] | None = None
+        #: B (j, p), the nodal forces of the pressures of flowing water
+        self.lift = lru_cache(maxsize=1)(lift_of)
         self._by_pressure: tuple[CsrMatrix, Array] | None = None
 
     def matrix(self) -> Array:
@@ -141,12 +144,6 @@ class WoodburySystem:
         Raises LinAlgError if A_0 is not positive definite: the joint does not support the dam.
         """
         return positive_inverse(self.matrix() if self.small_matrix is None else self.small_matrix)
-
-    def lift(self, flowing: tuple[Flow, ...]) -> CsrMatrix:
-        """B (j, p), the nodal forces of the pressures of flowing water; the last one is kept."""
-        if self._lift is None or flowing != self._lift[0]:
-            self._lift = flowing, lift_of(flowing)
-        return self._lift[1]
 
     def by_pressure(self, lift: CsrMatrix) -> Array:
         """C B (j, p), the jumps by unit pressures; the last one is kept."""

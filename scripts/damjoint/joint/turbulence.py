@@ -47,15 +47,15 @@ def turbulent_flow(
 ) -> tuple[FlowSolution, Array]:
     """The solution, and the flux over that of the cubic law (q,).
 
-    solve: the flow of conductivities over those of the cubic law (q,); conductivity: of the cubic
-    law, as in `FlowSystem.inverse_of`; guess: of that ratio, on which the result does not depend.
+    solve: the flow of conductivities (q,), as in `FlowSystem.inverse_of`; conductivity: those of
+    the cubic law; guess: of that ratio, on which the result does not depend.
     nan if it does not converge.
     """
     log = np.zeros(len(conductivity)) if guess is None else np.log(guess)
     before: list[tuple[Array, Array]] = []
     for _ in range(ITERATIONS):
         share = np.exp(log)
-        solution = solve(share)
+        solution = solve(conductivity * share)
         if not solution.systems:
             return solution, np.ones(len(log))
         (system,) = solution.systems

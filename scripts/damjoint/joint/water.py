@@ -223,7 +223,11 @@ class JointWater:
         the opening, by the `aperture`.
         """
         factor, growth = self.aperture(jump, variables)
-        return factor**3, np.where(growth > 0, 3 / self.narrowest * factor**2, 0)
+        return factor**3, self.growing(factor, growth)
+
+    def growing(self, factor: Array, growth: Array) -> Array:
+        """Derivative of the `conductivity` with the opening, by the `aperture`."""
+        return np.where(growth > 0, 3 / self.narrowest * factor**2, 0)
 
     def outlets(self, loading: Loading) -> tuple[IntArray, Array]:
         """Nodes of the drains of flowing water, by their numbers in `system`, and heads of their
@@ -474,12 +478,10 @@ class WaterSystem:
         effect: float | None,
     ) -> FlowSolution:
         opened = [water.opened(jump, variables, before_quake) for water in self.members]
-        factors = [
-            water.conductivity(*at)[0] for water, at in zip(self.members, opened, strict=True)
-        ]
+        factors = [water.aperture(*at)[0] for water, at in zip(self.members, opened, strict=True)]
         conductivity = np.concatenate(
             [
-                water.scale * factor * water.joint.points.weights
+                water.scale * factor**3 * water.joint.points.weights
                 for water, factor in zip(self.members, factors, strict=True)
             ]
         )
@@ -492,14 +494,19 @@ class WaterSystem:
         def solved(
             conductivity: Array, nodes: IntArray, outlet: Array, step: TimeStep | None = step
         ) -> FlowSolution:
+            flow_by = (
+                self.flow_in_time(step, factors, imposed, at_ends, nodes, weight * outlet)
+                if step
+                else lambda conductivity: steady(conductivity, nodes, outlet)
+            )
             if not self.turbulent.any():
-                return by_conductivity(conductivity, nodes, outlet, step)
+                return flow_by((self.reference if step else 1) * conductivity)
             like = len(nodes), step.part if step else 0
             per_gradient = 2 * self.reference * conductivity / self.flow.points.weights
             per_gradient *= self.members[0].case["rho_water"] / self.members[0].case["visc"]
             per_gradient *= self.turbulent
             solution, last = turbulent_flow(
-                lambda share: by_conductivity(share * conductivity, nodes, outlet, step),
+                flow_by,
                 (self.reference if step else 1) * conductivity,
                 per_gradient,
                 self.last_slowed.get(like),
@@ -507,13 +514,7 @@ class WaterSystem:
             self.last_slowed[like] = last
             return solution
 
-        def by_conductivity(
-            conductivity: Array, nodes: IntArray, outlet: Array, step: TimeStep | None
-        ) -> FlowSolution:
-            if step:
-                return self.solve_in_time(
-                    step, jump, conductivity, imposed, at_ends, nodes, weight * outlet
-                )
+        def steady(conductivity: Array, nodes: IntArray, outlet: Array) -> FlowSolution:
             if not len(self.fields.ends):  # at rest
                 return FlowSolution(pressure=0 * at_ends[self.fields.inside], systems=[])
             solution = self.flow.solve(conductivity, at_ends, nodes, weight * outlet, exits)
@@ -593,21 +594,19 @@ class WaterSystem:
                 fades.append((effect * (with_it.pressure - without.pressure), rate))
         return replace(free.mixed(effect * shares[-1], mean), fades=fades)
 
-    def solve_in_time(
+    def flow_in_time(
         self,
         step: TimeStep,
-        jump: Array,
-        conductivity: Array,
+        factors: list[Array],
         imposed: Array,
         at_ends: Array,
         drains: IntArray,
         drained: Array,
-    ) -> FlowInTime:
-        """As `Flow.solve` of a conductivity over that of the closed first joint, at the end of a
-        time step, see flow_in_time.py. The pressure at a dry end is zero.
+    ) -> Callable[[Array], FlowInTime]:
+        """As `Flow.solve` at the end of a time step, see flow_in_time.py, as a function of
+        w^3/(12 visc) times weights (q,); factors: see `volume_by`. The pressure at a dry end is 0.
         """
-        flow, case, ends = self.flow, self.members[0].case, self.fields.ends
-        elevation = self.unit_weight * self.fields.joint.surface.points[:, 1]
+        ends, elevation = self.fields.ends, self.elevation
         heads, (known, dry) = at_ends.copy(), np.zeros((2, len(at_ends)), bool)
         dry[ends] = at_ends[ends] - elevation[ends] <= ROUNDING * np.abs(at_ends).max()
         heads[dry] = elevation[dry]
@@ -615,17 +614,21 @@ class WaterSystem:
         known[ends] = known[drains] = True
         like = len(drains), step.part
         balance = WaterBalance(
-            flow=flow,
+            flow=self.flow,
             step=step,
-            volume=self.volume(jump),
+            volume=self.volume_by(factors),
             storage=self.storage,
             elevation=elevation,
-            lowest=case["pressure_min"],
-            guess=self.last_voids.get(like, step.begin.void) > 0,
+            lowest=self.members[0].case["pressure_min"],
         )
-        solution = balance.solve(self.reference * conductivity, imposed, heads, known, dry)
-        self.last_voids[like] = solution.void
-        return solution
+
+        def flow_by(conductivity: Array) -> FlowInTime:
+            guess = self.last_voids.get(like, step.begin.void) > 0
+            solution = balance.solve(conductivity, imposed, heads, known, dry, guess)
+            self.last_voids[like] = solution.void
+            return solution
+
+        return flow_by
 
     @cached_property
     def turbulent(self) -> BoolArray:
@@ -641,7 +644,7 @@ class WaterSystem:
         effects = (w.case["drain_effectiveness"] for w in self.members if w.drains)
         return float(next(effects, 0.0))
 
-    @property
+    @cached_property
     def reference(self) -> float:
         """w^3/(12 visc) of the closed first joint [m3/(Pa s)]."""
         case = self.members[0].case
@@ -652,7 +655,12 @@ class WaterSystem:
         """Area of the joints that each node stands for (n,) [m2; 2D: per metre]."""
         return np.asarray(self.flow.fields.at_points.T @ self.flow.points.weights)
 
-    @property
+    @cached_property
+    def elevation(self) -> Array:
+        """Height of the nodes times the water's weight (n,) [Pa]."""
+        return np.asarray(self.unit_weight * self.fields.joint.surface.points[:, 1])
+
+    @cached_property
     def storage(self) -> Array:
         """What the nodes store by the water's compressibility (n,) [m3/Pa]."""
         flow = self.flow
@@ -661,8 +669,13 @@ class WaterSystem:
 
     def volume(self, jump: Array) -> Array:
         """Volume of the joint that each node stands for (n,) [m3; 2D: per metre]."""
+        return self.volume_by([water.aperture(jump, None)[0] for water in self.members])
+
+    def volume_by(self, factors: list[Array]) -> Array:
+        """The same by the apertures of each joint over that of the closed one, see `aperture`."""
         apertures = [
-            water.case["aperture_min"] * water.aperture(jump, None)[0] for water in self.members
+            water.case["aperture_min"] * factor
+            for water, factor in zip(self.members, factors, strict=True)
         ]
         flow = self.flow
         return np.asarray(
@@ -673,12 +686,11 @@ class WaterSystem:
         self, jump: Array, variables: JointVariables, loading: Loading, time: float
     ) -> StoredWater:
         """What is stored by steady flow at a jump, at a time; suction stores nothing."""
-        elevation = self.unit_weight * self.fields.joint.surface.points[:, 1]
         imposed, volume = self.unit_weight * self.heads(loading), self.volume(jump)
 
         def by(effect: float) -> StoredWater:
             solution = self.solve(jump, variables, loading, effect=effect)
-            pressure = np.maximum(imposed + self.expand_to_nodes(solution) - elevation, 0)
+            pressure = np.maximum(imposed + self.expand_to_nodes(solution) - self.elevation, 0)
             return stored_at_rest(volume, self.storage, pressure, time)
 
         effect = self.drain_effectiveness
@@ -719,16 +731,18 @@ class WaterSystem:
         frozen = [bool(before_quake and water.freezes_uplift) for water in self.members]
         if all(frozen) or not solution.systems:
             return None
+        apertures = [
+            water.aperture(*water.opened(jump, variables, before_quake)) for water in self.members
+        ]
         rates = [
-            (0 if unchanged else water.scale)
-            * water.conductivity(*water.opened(jump, variables, before_quake))[1]
-            * water.joint.points.weights
-            for water, unchanged in zip(self.members, frozen, strict=True)
+            (0 if unchanged else water.scale) * water.growing(*at) * water.joint.points.weights
+            for water, at, unchanged in zip(self.members, apertures, frozen, strict=True)
         ]
         if step is None:
             return self.flow.derivative(solution, np.concatenate(rates))
         growth = [
-            water.case["aperture_min"] * water.aperture(jump, None)[1] for water in self.members
+            water.case["aperture_min"] * rate
+            for water, (_, rate) in zip(self.members, apertures, strict=True)
         ]
         stored = self.flow.points.weights * np.concatenate(growth) / step.seconds
         return self.flow.derivative(solution, self.reference * np.concatenate(rates), stored)

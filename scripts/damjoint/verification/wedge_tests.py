@@ -246,11 +246,10 @@ class Splitting:
             storage=self.storage,
             elevation=np.zeros(len(self.heads)),
             lowest=-np.inf,
-            guess=np.zeros(len(self.heads), bool),
         )
         none = np.zeros(len(self.heads), bool)
         conductivity = weighted * np.maximum(width, NARROW) ** 3
-        water = balance.solve(conductivity, np.zeros(len(none)), self.heads, self.known, none)
+        water = balance.solve(conductivity, 0 * self.heads, self.heads, self.known, none, none)
         pressure = self.heads.copy()
         pressure[flow.inside] = water.pressure
         rates = flow.derivative(water, weighted * grows, weights / test.dt)

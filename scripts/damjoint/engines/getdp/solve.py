@@ -60,16 +60,22 @@ def check_joint(joint: Case) -> None:
         require(joint["order"] != 2, "order", 2, f"be 1 {engine} and uplift = waterstop in 3D")
 
 
+#: What this engine does not include with flow in time, and why.
+NOT_IN_TIME = {
+    "joint_slope": "in it no water runs down from a node with voids",
+    "drains": "in it the water has one history, not one with and one without drains",
+    "pressure_step": "its steps do not follow the pressure",
+}
+
+
 def check_flow_in_time(joint: Case) -> None:
     """Raise InputError if this engine cannot run a joint that stores water, from its case."""
-    other = [
-        f"and {n} = {joint[n]:g}" for n in ("joint_slope", "drains", "pressure_step") if joint[n]
-    ]
+    other = [f"and {n} = {joint[n]:g} ({why})" for n, why in NOT_IN_TIME.items() if joint[n]]
     if joint["dim"] == 3 or joint.geometry:
-        other.insert(0, "in 3D and in a geometry of one's own")
+        other.insert(0, "in 3D and in a geometry of one's own (steady flow)")
     if joint["drive"] != "level":
-        other.append(f"and drive = {joint['drive']}")
-    rule = f"be 0 with engine = getdp {''.join(other[:1])} (steady flow)"
+        other.append(f"and drive = {joint['drive']} (steady flow)")
+    rule = f"be 0 with engine = getdp {''.join(other[:1])}"
     require(not other, "time_unit", joint["time_unit"], rule)
 
 
