@@ -183,14 +183,15 @@ def with_time(settings: Drawn, rng: RandomNumbers) -> Drawn:
 
 
 def with_film(settings: Drawn, rng: RandomNumbers) -> Drawn:
-    """Settings, in some with flow an aperture that closing stress narrows, and turbulence (2D; some
+    """Settings, in some with flow an aperture that closing stress narrows, and turbulence (some
     with a thin liquid, so that it matters).
     """
     narrows, fast = rng.event(0.3), rng.event(0.3)
     if "flow" not in np.ravel(settings["uplift"]):
         return settings
     drawn = {"aperture_elastic": rng.log_uniform(1e-7, 1e-3)} if narrows else {}
-    if fast and "dim" not in settings:
+    fast = fast or ("dim" in settings and rng.event(0.6))
+    if fast:
         drawn |= {"turbulent": 1, "visc": rng.log_uniform(1e-6, 1e-3)}
     return settings | drawn
 

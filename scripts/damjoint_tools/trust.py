@@ -101,8 +101,8 @@ time limit is a defect.
 
 Not checked here: stresses in the bodies and pictures; the default values themselves; that the
 branch which the load steps follow is the one that a dam would take, where there are several
-equilibria; geometries of one's own, but for two blocks whose joints meet; turbulent flow in 3D;
-the reference GetDP model (the tests compare it with the engine of these runs)."""
+equilibria; geometries of one's own, but for two blocks whose joints meet; the reference GetDP model
+(the tests compare it with the engine of these runs)."""
 
 #: What `damjoint stress --quake` verifies in every scene, and beside it.
 QUAKES_VERIFIED = """\

@@ -41,8 +41,8 @@ CRACK_APERTURE, CRACK_MOST = 1 / 4.5e9, 100.0
 #: Digits of the elimination in a network: conductances of open and closed joints differ by 1e18.
 PRECISION = 60
 #: Reynolds number from which flow between smooth plates is turbulent, and the change of the drops
-#: of the head over the largest one up to which it is settled.
-TURBULENT, SETTLED = (96 / 0.316) ** (4 / 3), 1e-12
+#: of the head over the largest one up to which it is settled; in 3D, of a system of equations.
+TURBULENT, SETTLED, SETTLED_IN_3D = (96 / 0.316) ** (4 / 3), 1e-12, 1e-10
 #: Modes whose water flows, and those that water does not pass.
 FLOWING, CLOSED = ("flow", "cracked"), ("none", "waterstop")
 
@@ -136,11 +136,12 @@ class JointState:
 
     def slowed(self, cube: Array, slopes: Array) -> Array:
         """Return the flow between smooth plates over that of the cubic law, for the cubes of the
-        aperture (m, q) and slopes of the head (m,): beyond the Reynolds number at which both
-        friction factors are equal, 96/Re and 0.316/Re^(1/4), by the second one.
+        aperture (m, q) and slopes of the head, of elements (m, 1) or at points (m, q): beyond the
+        Reynolds number at which both friction factors are equal, 96/Re and 0.316/Re^(1/4), by the
+        second one.
         """
         values = self.values
-        gradient = self.unit_weight * np.abs(slopes)[:, None]
+        gradient = self.unit_weight * np.abs(slopes)
         number = values["rho_water"] * cube * gradient / (6 * values["visc"] ** 2)
         return np.asarray(np.minimum(1.0, (TURBULENT / np.maximum(number, 1)) ** (3 / 7)))
 
@@ -252,7 +253,7 @@ def pressure(joint: JointState, heads: Heads, least: float = 0.0) -> Callable[[A
 
 
 class HasDrops(Protocol):
-    """A solution with the drops of the head along the elements (m,) [m]."""
+    """A solution with the drops of the head, see `Flow`."""
 
     @property
     def drops(self) -> Array:
@@ -264,8 +265,9 @@ Solution = TypeVar("Solution", bound=HasDrops)
 
 @dataclass(frozen=True)
 class Flow:
-    """A solution: heads at the nodes (n,) [m], in 2D their drop along the elements (m,) [m], which
-    may be a small difference, and what enters at the nodes (n,).
+    """A solution: heads at the nodes (n,) [m], what enters at the nodes (n,), and drops: in 2D
+    those of the head along the elements (m,) [m], which may be small differences, in 3D its
+    gradients at the points of the law (p, 3).
     """
 
     heads: Array
@@ -334,9 +336,12 @@ class Graph:
 
 @dataclass(frozen=True)
 class Surface:
-    """Flow on surfaces: stiffness of order 1."""
+    """Flow on surfaces: stiffness of order 1, and the matrices by which the heads give their
+    gradients along x, y and z at the points of the law (p, n).
+    """
 
     matrix: Any
+    slopes: Sequence[Any]
 
     def solve(self, fixed: dict[int, float]) -> Flow:
         """Solve for fixed heads by node."""
@@ -348,7 +353,11 @@ class Surface:
         if len(free):
             rows = self.matrix[free]
             heads[free] = splu(rows[:, free].tocsc()).solve(-(rows @ heads))
-        return Flow(heads, np.zeros(0), np.asarray(self.matrix @ heads))
+        return Flow(heads, self.gradients(heads), np.asarray(self.matrix @ heads))
+
+    def gradients(self, heads: Array) -> Array:
+        """Return the gradients (p, 3) of heads (n,)."""
+        return np.column_stack([slope @ heads for slope in self.slopes])
 
 
 @dataclass(frozen=True)
@@ -413,11 +422,11 @@ class Network:
         self, uniform: bool, drops: Array | None = None, closed: Sequence[int] = ()
     ) -> Iterator[tuple[Sides, IntArray, Array]]:
         """Yield elements, their nodes, and w^3 times weights at the points of the law (m, q), in a
-        unit that is that of all joints; uniform: w = 1; drops: of the head along the elements (m,)
-        [m], under which the flow is turbulent, w^3 less by `slowed`; closed: nodes in whose
-        elements the joint conducts as if closed.
+        unit that is that of all joints; uniform: w = 1; drops: those of a `Flow`, under which the
+        flow is turbulent, w^3 less by `slowed`; closed: nodes in whose elements the joint conducts
+        as if closed.
         """
-        first = 0
+        first, plane = 0, self.first.values["dim"] == 2
         for joint, tables, widening in zip(self.joints, self.tables, self.widening, strict=True):
             narrowest = joint.values["aperture_min"] if self.by_aperture else 1.0
             for sides, table, factor in zip(joint.sides, tables, widening, strict=True):
@@ -425,10 +434,13 @@ class Network:
                 shut = np.isin(table, list(closed)).any(axis=1, keepdims=True)
                 cube = np.where(shut, 1, factor)
                 cube = np.ones_like(factor) if uniform else (narrowest * cube) ** 3
+                number = len(table) if plane else factor.size
                 if drops is not None and joint.values["uplift"] == "flow":
-                    own = drops[first : first + len(table)]
-                    cube = cube * joint.slowed(cube, own / (2 * sides.measures))
-                first += len(table)
+                    own = drops[first : first + number]
+                    lengths = 2 * sides.measures[:, None]
+                    slopes = own[:, None] / lengths if plane else steepness(own, factor)
+                    cube = cube * joint.slowed(cube, slopes)
+                first += number
                 yield sides, table, cube * np.outer(sides.measures, w)
 
     @property
@@ -446,9 +458,10 @@ class Network:
         least twice as close as the last; solve: the flow for the drops of the last one.
         """
         found = solve(None)
+        room = SETTLED if self.first.values["dim"] == 2 else SETTLED_IN_3D
         while self.turbulent:
             before, found = found, solve(found.drops)
-            if np.abs(found.drops - before.drops).max() <= SETTLED * np.abs(found.drops).max():
+            if np.abs(found.drops - before.drops).max() <= room * np.abs(found.drops).max():
                 break
         return found
 
@@ -465,6 +478,7 @@ class Network:
             return Graph(pairs, np.concatenate(by_length), len(self.nodes))
         number = len(self.nodes)
         total = sparse.csr_matrix((number, number))
+        by_axis = list[list[Any]]()
         for sides, table, sizes in parts:
             u, _ = joint_rule(sides.shape, sides.order, self.first.values["quadrature"])
             slopes = gradients(sides, u)
@@ -473,7 +487,15 @@ class Network:
             columns = np.tile(table, (1, table.shape[1])).ravel()
             entries = blocks.ravel(), (rows, columns)
             total = total + sparse.coo_matrix(entries, (number, number)).tocsr()
-        return Surface(total)
+            points = np.repeat(np.arange(sizes.size), table.shape[1])
+            nodes = np.repeat(table, len(u), axis=0).ravel()
+            by_axis.append(
+                [
+                    sparse.csr_matrix((part.ravel(), (points, nodes)), (sizes.size, number))
+                    for part in np.moveaxis(slopes, 3, 0)
+                ]
+            )
+        return Surface(total, [sparse.vstack(matrices) for matrices in zip(*by_axis, strict=True)])
 
     # -- ends
 
@@ -690,7 +712,7 @@ class Network:
             first = sum(len(t) for tables in self.tables[:joint] for t in tables)
             drops = self.flow.drops[first : first + len(table)]
             if values["turbulent"]:
-                cube = cube * state.slowed(cube, drops / lengths)
+                cube = cube * state.slowed(cube, (drops / lengths)[:, None])
             means = share * (cube @ w / 2 / lengths) * drops
             order = np.argsort(state.distance(sides.corners.mean(axis=1)))
             leakage = float(means[order[-1]])
@@ -698,6 +720,8 @@ class Network:
             of_functions = gradients(sides, u)
             steepest = np.abs(of_functions).max()
             slopes = np.einsum("mqax,ma->mqx", of_functions, self.heads[table])
+            if values["turbulent"]:
+                cube = cube * state.slowed(cube, np.linalg.norm(slopes, axis=2))
             along = slopes[..., :2] @ state.along
             means = -share * (cube * along) @ w / w.sum()
             own = self.nodes_of(joint)
@@ -734,6 +758,11 @@ def distinct_places(places: Array) -> tuple[Array, IntArray]:
     _, number = connected_components(links, directed=False)
     _, first = np.unique(number, return_index=True)
     return places[first], np.asarray(number, int)
+
+
+def steepness(gradients: Array, like: Array) -> Array:
+    """Return the sizes (m, q) of gradients (m q, 3) at points, as many as those of an array."""
+    return np.asarray(np.linalg.norm(gradients, axis=1).reshape(like.shape))
 
 
 def gradients(sides: Sides, u: Array) -> Array:

@@ -83,8 +83,8 @@ Histories: TypeAlias = tuple[Stored, Stored]
 
 @dataclass(frozen=True)
 class Filled:
-    """The end of a step: pressure at the nodes (n,) [Pa], what is stored, and the drops of the head
-    along the elements (m,) [m].
+    """The end of a step: pressure at the nodes (n,) [Pa], what is stored, and the drops of the
+    head, see `Flow`.
     """
 
     pressure: Array
@@ -222,7 +222,8 @@ class Slot:
                 stored = volume + storage * pressure - void
                 digits = begin.digits + np.where(is_known, least, 0)
                 end = Stored(stored, void, begin.inflow + inflow, digits)
-                return Filled(pressure, end, falling / first.unit_weight)
+                drops = falling if isinstance(operator, Graph) else operator.gradients(total)
+                return Filled(pressure, end, drops / first.unit_weight)
             voids, air = (voids | empties) & ~fills, drawn
         raise NoSet
 

@@ -125,6 +125,7 @@ TRIANGLE: dict[int, tuple[list[tuple[float, ...]], list[float]]] = {
 _A4, _B4 = 0.1381966011250105, 0.5854101966249685
 
 
+@cache
 def tensor(n: int, d: int) -> tuple[Array, Array]:
     """Gauss points (n^d, d) and weights on [-1, 1]^d."""
     x, w = np.polynomial.legendre.leggauss(n)
