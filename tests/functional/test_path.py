@@ -78,7 +78,9 @@ def test_a_dam_on_a_brittle_bond_is_followed_beyond_its_limit_point(solve, n_joi
     assert verdict(result) == "stands" and result.last["level"] == 51
     ((limit, lowest),) = result.info["limit_points"]
     assert 48 < limit < 51 and limit - lowest > 1
-    assert any(f"unstable crack growth at level {limit:.4g} m" in hint for hint in hints(result))
+    result.info["limit_points"] += ((limit + 1e-6, lowest),)  # as where it is passed once more
+    said = f"unstable crack growth at level {limit:.4g} m"
+    assert sum(said in hint for hint in hints(result)) == 1
     # where the bond is broken it has no influence: a dam without a bond has nearly the same state
     (unbonded,) = solve("dam", "51", **BRITTLE | {"sigma_max": 0, "adhesion": 0}, n_joint=n_joint)
     for name in ("N", "T", "M"):

@@ -32,7 +32,8 @@ def hints(results: Results) -> list[str]:
         of_joints += (f"{name}: {hint}" if name else hint for hint in hints_on_joint(joint_result))
     if case.published:
         return of_joints
-    return of_joints + hints_on_run(results)
+    # limit points of the same digits are passed twice where a step reaches just above the first
+    return list(dict.fromkeys(of_joints + hints_on_run(results)))
 
 
 def hints_on_joint(results: Results) -> list[str]:
