@@ -8,7 +8,7 @@ import shutil
 import numpy as np
 import pytest
 from damjoint import cli
-from damjoint_witness import elasticity, water, water_in_time
+from damjoint_witness import elasticity, statics, water, water_in_time
 from damjoint_witness.files import Files, read_table
 from damjoint_witness.reader import read
 
@@ -110,6 +110,51 @@ def test_films_are_told_apart(written, name):
         other = tuple(changed if word.startswith(f"{parameter}=") else word for word in words)
         assert other != words
         assert "joint 1: " in "".join(found(check, folder, other)), changed
+
+
+#: Parameters that random scenes do not draw, and other values of them, which the balance of the
+#: loads notices, or the elasticity of the bodies.
+OF_LOADS = {
+    "silt_t": (2, 2.5),
+    "ice_t": (2, 2.5),
+    "force_t": (2, 2.5),
+    "anchor_t": (2, 2.5),
+    "quake_t": (3, 3.5),
+    "ice_level": (38, 38.8),
+    "force_at": (1, 1.1),
+    "anchor_at": (2, 2.1),
+    "force_y": (-2e5, -2.1e5),
+    "rho_dam": (2350, 2360),
+    "rho_silt": (1100, 1110),
+    "rho_water": (1020, 1021),
+    "g": (9.7, 9.71),
+    "crest_water": (1, 0),
+}
+OF_BODIES = {"nu_dam": (0.25, 0.251), "expansion_dam": (8e-6, 8.1e-6), "temperature_t": (2, 2.5)}
+ALL_LOADS = (
+    "run dam --set order=1 --set uplift=drained --set drain_x=5 --set silt_height=12 "
+    "--set ice_force=2e5 --set force_x=1e5 --set anchor_force=4e5 --set anchor_angle=20 "
+    "--set k_h=0.05 --set k_v=0.03 --set temperature_dam=-2 --levels 38,40,46 --tail-levels 4 "
+    "--steps 2 "
+) + " ".join(f"--set {name}={was:g}" for name, (was, _) in (OF_LOADS | OF_BODIES).items())
+
+
+def test_times_places_and_densities_of_loads_are_told_apart(tmp_path):
+    words = ALL_LOADS.split()
+    cli.main([*words, *SMALL.split(), "--out", str(tmp_path)])
+
+    def problems(check, **changed):
+        new = {f"{name}={was:g}": f"{name}={to:g}" for name, (was, to) in changed.items()}
+        other = tuple(new.get(word, word) for word in [*words, *SMALL.split()[:-1]])
+        files, asked = Files(tmp_path, other), read(other)
+        if check is statics:
+            return list(statics.balance(files, asked))
+        return list(elasticity.violations(files, asked, read_table(tmp_path / "steps.csv")))
+
+    for check, parameters in ((statics, OF_LOADS), (elasticity, OF_BODIES)):
+        assert problems(check) == []
+        for name, values in parameters.items():
+            assert problems(check, **{name: values}), name
 
 
 @pytest.mark.heavy
