@@ -9,13 +9,14 @@ import sys
 import time
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from closed_forms import slide_level, slide_level_of_45_m_dam
 from damjoint.input.case_names import CASES
 from damjoint.input.resolve import load, varied
 from damjoint.statics import gravity
 from damjoint.studies import chart, sweep
-from damjoint.studies.plan import plan_of, plan_with
+from damjoint.studies.plan import plan_of, plan_with, quantity_of
 from damjoint.units import LENGTHS
 from processes import without_progress
 from quakes import smooth_record
@@ -246,6 +247,13 @@ def test_the_search_of_a_row_is_that_of_its_case():
         own = load("dam", settings, levels=base.levels, tail_levels=base.tail_levels)
         assert search.base == replace(varied(own, search.settings), published=False)
         assert search.case == replace(own, published=False)
+
+
+def test_what_varies_may_be_of_one_joint():
+    """Its axis and its unit are those of the parameter of all joints."""
+    label = "lift 12 m.adhesion [kPa]"
+    assert chart.axis_of("lift 12 m.adhesion", np.array([2e5])) == (label, 1e-3)
+    assert quantity_of("lift 12 m.adhesion") == ("lift 12 m.adhesion", "Pa")
 
 
 @pytest.mark.usefixtures("no_pictures")

@@ -366,6 +366,11 @@ def parameter(name: str) -> Parameter:
     return known[name]
 
 
+def of_any_joint(name: str) -> Parameter:
+    """The declared parameter of a name NAME or, for one joint, JOINT.NAME. Raises InputError."""
+    return parameter(name.rpartition(".")[2])
+
+
 def settings(pairs: Iterable[str]) -> dict[str, Setting]:
     """{name: checked value} from texts 'name=value', 'name=value,value' with a value for each
     joint, or 'joint.name=value' for one of them.

@@ -15,7 +15,17 @@ from ..input.case import Case
 from ..model.results import HISTORY, IN_TIME, LATERAL, history_columns
 from ..progress import track
 from ..python_words import speaks_python
-from ..studies.plan import Limits, Plan, Sample, cases_of, column_of, in_file, listed, plan_with
+from ..studies.plan import (
+    Limits,
+    Plan,
+    Sample,
+    cases_of,
+    column_of,
+    in_file,
+    listed,
+    plan_with,
+    quantity_of,
+)
 from .cases import as_case, noted, on_fixed_mesh, warn
 from .tables import Tables, WithTables, by_column, displayed, records
 
@@ -107,13 +117,12 @@ class Sweep(WithTables):
         last row of history.csv, failed, verdict, statement, the critical value; nan without an
         equilibrium.
         """
-        from ..studies.chart import quantity
         from ..studies.quake_summary import QUAKE_UNITS
 
         units = QUAKE_UNITS | {name: u for name, (u, _) in history_columns(self.case).items()}
-        units |= {column_of(name): quantity(name)[1] for name in self.plan.names}
+        units |= {column_of(name): quantity_of(name)[1] for name in self.plan.names}
         if self.plan.critical:
-            units[self.plan.critical_columns[0]] = quantity(self.plan.critical)[1]
+            units[self.plan.critical_columns[0]] = quantity_of(self.plan.critical)[1]
         rows = {name: column_array(name, values) for name, values in self.table.items()}
         return {"rows": (rows, {name: (unit, "") for name, unit in units.items()})}
 

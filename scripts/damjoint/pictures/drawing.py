@@ -78,9 +78,9 @@ TICK = 0.5, 0.25
 RANGE = 0.05
 
 
-def figure_of(width: float, height: float) -> Figure:
+def figure_of(width: float, height: float, **options: Any) -> Figure:
     """Create an empty figure; sizes in inches."""
-    figure = Figure(figsize=(width, height))
+    figure = Figure(figsize=(width, height), **options)
     FigureCanvasAgg(figure)
     return figure
 

@@ -9,7 +9,7 @@ from typing import TextIO
 
 import numpy as np
 
-from ..arrays import Table
+from ..arrays import Table, Value
 from ..model.results import Results, of_control
 from ..storage import SAVED, atomic_write
 
@@ -44,6 +44,14 @@ def write_csv(target: Path | TextIO, table: Mapping[str, Column], digits: str = 
     writer.writerows(
         [as_text(v) if isinstance(v, str) else format(v, digits) for v in row] for row in rows
     )
+
+
+def write_rows(target: Path, rows: Sequence[Mapping[str, Value]]) -> None:
+    """Write rows of the same columns, with all digits of their numbers."""
+    with atomic_write(target) as path, path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
 
 
 def rounded(joint: Table) -> Table:

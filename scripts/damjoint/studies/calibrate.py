@@ -25,11 +25,11 @@ from ..input.arithmetic import explained, quantity
 from ..input.case import Case
 from ..input.resolve import varied
 from ..processes import as_finished, number_of
-from ..solver.derivatives import half_difference
 from ..solver.load_stepper import LoadStepper
 from ..threads import limited_threads
 from . import sampling
 from .measurements import Measurements, Series
+from .sensitivity import has_derivative
 
 #: Confidence level of the intervals.
 CONFIDENCE = 0.95
@@ -322,15 +322,6 @@ class Calibration:
 
 #: What a trial computes: the series, or None if the dam has no equilibrium at a reading.
 Computed = Array | None
-
-
-def has_derivative(case: Case, name: str) -> bool:
-    """Whether a parameter has derivatives by direct differentiation."""
-    try:
-        half_difference(case, name)
-    except InputError:
-        return False
-    return True
 
 
 def trial(measurements: Measurements, case: Case) -> Computed:

@@ -12,18 +12,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import XAxis
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
 from .. import InputError
-from ..input import parameters
 from ..input.case import Case
 from ..pictures.drawing import BLUE, ORANGE, RED, picture_style, widen, write_picture
+from ..pictures.drawing import figure_of as drawing_of
 from ..statics.gravity import sliding_factor
 from ..units import LENGTHS, Units, unit
-from .plan import Plan, Row, column_of, numbers
-from .report_input import UNITS
+from .plan import Plan, Row, column_of, numbers, quantity_of
+from .report_input import suitable_unit
 from .sweep import UNDECIDED
 
 #: Quantities drawn: label and units.
@@ -115,8 +114,7 @@ def figure_of(plan: Plan, rows: list[Row], cases: list[Case], title: str) -> Fig
             "at most two with numbers as values, beside a sample at most one"
         )
     high = not plan.sampled and not plan.critical
-    figure = Figure(figsize=(10, 7 if high else 4.8), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = drawing_of(10, 7 if high else 4.8, layout="constrained")
     figure.suptitle(textwrap.fill(title, 100), fontsize=11, parse_math=False)
     along = sorted(axes, key=lambda name: -counts[name]) if drawing is draw_curves else axes
     drawing(figure, Table(plan, rows, cases), along or others[:1])
@@ -132,24 +130,10 @@ def is_number(value: float | str) -> bool:
     return True
 
 
-#: Names and units of what is varied besides parameters.
-QUANTITIES = {
-    "level": ("water level", "m"),
-    "record": ("record", ""),
-    "strength": ("strength reduction", "-"),
-    "uplift": ("drain_effectiveness", "-"),
-}
-
-
-def quantity(name: str) -> tuple[str, str]:
-    """Name and unit of a varied or critical quantity."""
-    return QUANTITIES.get(name) or (name, parameters.parameter(name).unit)
-
-
 def axis_of(name: str, values: np.ndarray) -> tuple[str, float]:
     """The label of the axis of a varied or sampled name, and the factor to the unit that suits."""
-    words, size = quantity(name) if name == "level" else (name, parameters.parameter(name).unit)
-    size, factor = unit([values], UNITS.get(size, ((size, 1),)))
+    words, size = quantity_of(name)
+    size, factor = suitable_unit(size, values)
     return f"{words} [{size}]" if size else words, factor
 
 
@@ -188,7 +172,7 @@ def panels_of(figure: Figure, table: Table) -> Iterator[tuple[Axes, str, tuple[s
     """Create axes for what is drawn: DRAWN and SSF, those of earthquakes, or critical values."""
     plan, drawn = table.plan, drawn_of(table.plan)
     if plan.critical:
-        words, size = quantity(plan.critical)
+        words, size = quantity_of(plan.critical)
         drawn = {plan.critical_columns[0]: (f"critical {words}", ((size, 1),))}
     elif not plan.quake:
         drawn[FACTOR] = FACTOR_LABEL, (("-", 1),)

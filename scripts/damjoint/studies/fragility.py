@@ -10,7 +10,6 @@ Rows of one record alone count as independent of each other, which is said.
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +22,7 @@ from scipy import optimize, stats
 from .. import InputError
 from ..arrays import Array, BoolArray, IntArray, Value
 from ..post.summary import aligned
-from ..storage import atomic_write
+from ..post.tables import write_rows
 from . import sampling
 from .plan import FRAGILITY, MOTION, Plan, Row, beside, numbers
 from .quake_summary import INTENSITIES
@@ -69,18 +68,22 @@ class Fit:
         logs = np.log(self.intensity)
         return np.column_stack([np.ones(len(logs)), logs - logs.mean()])
 
-    def scores(self, estimate: Array) -> Array:
-        """(n, 2): derivative of each row's log-likelihood with the estimate (2,)."""
+    def _ratios(self, estimate: Array) -> tuple[Array, Array, Array]:
+        """Sign of each row, 1 if it exceeds the limit; probit of what it does; density over
+        probability there.
+        """
         sign = np.where(self.exceeds, 1.0, -1.0)
         z = sign * (self._logs @ estimate)
-        ratio = np.exp(stats.norm.logpdf(z) - stats.norm.logcdf(z))
+        return sign, z, np.exp(stats.norm.logpdf(z) - stats.norm.logcdf(z))
+
+    def scores(self, estimate: Array) -> Array:
+        """(n, 2): derivative of each row's log-likelihood with the estimate (2,)."""
+        sign, _, ratio = self._ratios(estimate)
         return np.asarray(self._logs * (sign * ratio)[:, None])
 
     def information(self, estimate: Array) -> Array:
         """(2, 2): minus the second derivative of the log-likelihood."""
-        sign = np.where(self.exceeds, 1.0, -1.0)
-        z = sign * (self._logs @ estimate)
-        ratio = np.exp(stats.norm.logpdf(z) - stats.norm.logcdf(z))
+        _, z, ratio = self._ratios(estimate)
         return np.asarray((self._logs * (ratio * (z + ratio))[:, None]).T @ self._logs)
 
     @cached_property
@@ -217,10 +220,7 @@ def report(curves: Sequence[Fit], out: Path, intensity: str) -> str:
     if not curves:
         return "no row is decided: no fragility"
     table, unit = [curve.row() for curve in curves], INTENSITIES[intensity]
-    with atomic_write(beside(out, FRAGILITY[0])) as path, path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, ["intensity", *table[0]], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows({"intensity": intensity, **row} for row in table)
+    write_rows(beside(out, FRAGILITY[0]), [{"intensity": intensity, **row} for row in table])
     cells = []
     for row, curve in zip(table, curves, strict=True):
         low, high = row["median_low"], row["median_high"]

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..pictures.drawing import BLUE, DARK, GREEN, ORANGE, RED, VIOLET, picture_style, write_picture
+from ..pictures.drawing import figure_of as drawing_of
 from .fragility import Fit
 from .quake_summary import INTENSITIES
 
@@ -34,8 +34,7 @@ def draw(curves: Sequence[Fit], title: str, intensity: str, path: Path) -> None:
 @picture_style()
 def figure_of(curves: Sequence[Fit], title: str, intensity: str) -> Figure:
     """The figure."""
-    figure = Figure(figsize=(9, 5.4), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = drawing_of(9, 5.4, layout="constrained")
     axes = figure.subplots()
     least, most = (f(np.concatenate([c.intensity for c in curves])) for f in (np.min, np.max))
     x = np.geomspace(least / MARGIN, most * MARGIN, 200)

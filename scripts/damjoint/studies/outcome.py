@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
 from tabulate import tabulate
 
 from ..arrays import Value
-from ..storage import atomic_write
+from ..post.tables import write_rows
 from . import sampling
 from .plan import STATISTICS, Plan, Row, beside, column_of, numbers
 from .sweep import UNDECIDED
@@ -97,10 +96,7 @@ def report(plan: Plan, rows: list[Row], out: Path) -> str:
         title = f"Sobol's indices, with half of their {sampling.CONFIDENCE:.0%} intervals"
         named.append((STATISTICS[-1], title, shares))
     for ending, title, table in named:
-        with atomic_write(beside(out, ending)) as path, path.open("w", newline="") as file:
-            writer = csv.DictWriter(file, table[0], lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(table)
+        write_rows(beside(out, ending), table)
         cells = [{n: "-" if v != v else v for n, v in row.items()} for row in table]  # nan
         texts.append(f"{title}\n{tabulate(cells, 'keys', floatfmt='.4g')}")
     return "\n\n".join(texts)

@@ -77,7 +77,7 @@ class Sample:
         from . import sampling  # loads scipy.stats
 
         for name, text in self.distributions.items():
-            known = None if name == "level" else parameters.parameter(name.rpartition(".")[2])
+            known = None if name == "level" else parameters.of_any_joint(name)
             if known and (known.text or known.choices):
                 raise InputError(f"--sample {name}={text}: must be of a parameter that is a number")
             sampling.distribution(name, text)
@@ -295,6 +295,20 @@ class Plan:
 def column_of(name: str) -> str:
     """The column of a plan's name; `level` is a column of the history."""
     return f"{name}_requested" if name == "level" else name
+
+
+#: Names and units of what is varied or critical besides parameters.
+QUANTITIES = {
+    "level": ("water level", "m"),
+    "record": ("record", ""),
+    "strength": ("strength reduction", "-"),
+    "uplift": ("drain_effectiveness", "-"),
+}
+
+
+def quantity_of(name: str) -> tuple[str, str]:
+    """Name and unit of a varied or critical quantity. Raises InputError."""
+    return QUANTITIES.get(name) or (name, parameters.of_any_joint(name).unit)
 
 
 def numbers(rows: list[Row], column: str) -> Array:

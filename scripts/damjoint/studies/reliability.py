@@ -25,6 +25,7 @@ from scipy import stats
 from .. import InputError, RunError
 from ..arrays import Array, BoolArray, Value, Values
 from ..input.case import Case
+from ..input.parameters import of_any_joint
 from ..input.resolve import varied
 from ..joint.interface import interface_of
 from ..processes import number_of
@@ -170,9 +171,7 @@ class Variables:
 
 def check_continuous(option: str, name: str) -> None:
     """Raise InputError if a name, of an option, is not of a parameter that is a real number."""
-    from ..input.parameters import parameter
-
-    if not parameter(name.rpartition(".")[2]).real:
+    if not of_any_joint(name).real:
         raise InputError(f"{option}: must be of a parameter that is a real number")
 
 

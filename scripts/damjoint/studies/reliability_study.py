@@ -11,7 +11,6 @@ from scipy import stats
 from tabulate import tabulate
 
 from ..input.case import Case
-from ..input.parameters import parameter
 from ..input.written_case import case_text
 from ..post.folder import entries_of
 from ..processes import check_jobs
@@ -20,6 +19,7 @@ from ..session import session
 from ..storage import atomic_write
 from ..units import with_slash
 from . import reliability_picture, sampling
+from .plan import quantity_of
 from .reliability import (
     CriticalLevels,
     Reliability,
@@ -199,4 +199,4 @@ def printed_lines(levels: CriticalLevels, results: Sequence[Reliability], out: P
 
 def unit_of(name: str) -> str:
     """Unit of a variable."""
-    return "m" if name == "level" else with_slash(parameter(name.rpartition(".")[2]).unit)
+    return with_slash(quantity_of(name)[1])

@@ -182,10 +182,15 @@ def entry(parameter: Parameter, values: Sequence[Value], default: Value) -> Entr
         words = ", ".join(map(str, shown)), "", "".join(map(str, others))
         return Entry(parameter.description, *words)
     numbers = np.array([*shown, *others], float)
-    name, factor = unit([numbers], UNITS.get(parameter.unit, ((parameter.unit, 1),)))
+    name, factor = suitable_unit(parameter.unit, numbers)
     texts = [f"{v * factor:.6g}" for v in numbers]
     of_joints, of_default = texts[: len(shown)], texts[len(shown) :]
     return Entry(parameter.description, ", ".join(of_joints), name, *of_default)
+
+
+def suitable_unit(known: str, values: np.ndarray) -> tuple[str, float]:
+    """The unit in which values of a parameter are shown, and its number per the declared one."""
+    return unit([values], UNITS.get(known, ((known, 1),)))
 
 
 def same(value: Value, default: Value) -> bool:

@@ -13,16 +13,15 @@ from typing import Any
 import numpy as np
 
 from .. import InputError
-from ..input.parameters import parameter
+from ..input.parameters import of_any_joint
 from ..pictures.report_picture import Picture, bands
 from ..post import stored
 from ..post.folder import RECORD, read_info, read_record
 from ..post.summary import Table
-from ..units import unit
 from . import report_input, sampling
 from .calibrate_study import RESIDUALS
 from .fragility_picture import NAMES
-from .plan import FRAGILITY, beside
+from .plan import FRAGILITY, beside, quantity_of
 from .plan import RECORD as SWEEP_RECORD
 from .quake_summary import INTENSITIES
 from .reliability_study import PICTURE, index_of, unit_of
@@ -121,8 +120,7 @@ def plain(names: list[str], rows: Iterable[tuple[str, ...]]) -> Table:
 
 def sized(name: str, values: Sequence[float]) -> tuple[str, list[str]]:
     """The unit in which values of a parameter are shown, and the values."""
-    known = "m" if name == "level" else parameter(name.rpartition(".")[2]).unit
-    shown, factor = unit([np.array(values)], report_input.UNITS.get(known, ((known, 1.0),)))
+    shown, factor = report_input.suitable_unit(quantity_of(name)[1], np.array(values))
     return shown, [f"{value * factor:.4g}" for value in values]
 
 
@@ -130,7 +128,7 @@ def named(name: str) -> tuple[str, str, str]:
     """Name, meaning and unit of a parameter or of what a sweep varies besides."""
     if name in MEANINGS:
         return name, *MEANINGS[name]
-    return name, parameter(name.rpartition(".")[2]).description, unit_of(name)
+    return name, of_any_joint(name).description, unit_of(name)
 
 
 # -- reliability

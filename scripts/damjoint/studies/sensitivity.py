@@ -15,7 +15,7 @@ import numpy as np
 from .. import InputError, RunError
 from ..arrays import Array, Value
 from ..input.case import Case
-from ..input.parameters import declared, parameter
+from ..input.parameters import declared, of_any_joint, parameter
 from ..input.resolve import varied
 from ..model.results import Results, column_of, with_all_joints
 from ..post.summary import aligned, fitted
@@ -118,7 +118,7 @@ class Sensitivity:
     @property
     def unit(self) -> str:
         """Of the parameter."""
-        return parameter(self.name.rpartition(".")[2]).unit
+        return of_any_joint(self.name).unit
 
 
 def names_of(
@@ -196,6 +196,15 @@ def all_of(case: Case) -> list[str]:
     return names
 
 
+def has_derivative(case: Case, name: str) -> bool:
+    """Whether a parameter has derivatives by direct differentiation."""
+    try:
+        half_difference(case, name)
+    except InputError:
+        return False
+    return True
+
+
 def of_run(case: Case, names: Sequence[str]) -> list[Sensitivity]:
     """Derivatives at the levels of a case, each with all parameters, up to the last equilibrium.
 
@@ -206,8 +215,8 @@ def of_run(case: Case, names: Sequence[str]) -> list[Sensitivity]:
         stepper.run()
         updates, ends = stepper.saved_updates
         columns = list(with_all_joints(dict.fromkeys(CONTINUOUS, ("", "")), stepper.case))
-        others = [name for name in names if is_of_geometry(stepper.case, name)]
-        direct = [name for name in names if name not in others]
+        direct = [name for name in names if has_derivative(stepper.case, name)]
+        others = [name for name in names if name not in direct]
         rates, _ = Differentiation(stepper.model, direct).along(updates, ends, values_of_sides)
         # near a kink: also those for a larger value, which are others at a kink
         kinks = rates[-1].kink.tolist() if rates else []

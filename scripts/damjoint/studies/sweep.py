@@ -15,7 +15,6 @@ from .. import InputError, RunError, accuracy, runner
 from ..arrays import Value, Values
 from ..dynamics import record_files
 from ..engines import engine_of
-from ..input import parameters
 from ..input.case import Case
 from ..input.refinement import first_mesh
 from ..input.resolve import equal_steps, resolve, with_drive_times
@@ -45,6 +44,7 @@ from .plan import (
     cases_of,
     column_of,
     in_file,
+    quantity_of,
 )
 from .quake_summary import NO_FRICTION, NOT_AT_REST, QUAKE_COLUMNS
 from .result_file import rows_session
@@ -442,8 +442,9 @@ def rows_table(plan: Plan, rows: list[Row], width: int | None = None) -> str:
     shown_always = [*map(column_of, plan.names), *plan.critical_columns[:3]]
     names = [n for n in dict.fromkeys([*shown_always, *results]) if rows and n in rows[0]]
     cells = [[short(name, row[name]) for name in names] for row in rows[:PRINTED]]
-    units = {column_of(n): unit_of(n) for n in plan.names}
-    units |= {f"critical_{plan.critical}": unit_of(plan.critical)} if plan.critical else {}
+    units = {column_of(n): quantity_of(n)[1] for n in plan.names}
+    if plan.critical:
+        units[plan.critical_columns[0]] = quantity_of(plan.critical)[1]
     units |= {name: unit for name, (unit, _) in PRINTED_UNITS.items()}
     heads = [f"{n}\n[{units[n]}]" if units.get(n, "-") not in ("-", "") else n for n in names]
     if not rows:
@@ -452,14 +453,6 @@ def rows_table(plan: Plan, rows: list[Row], width: int | None = None) -> str:
     rest = f"\n... and {more} rows more" if more > 0 else ""
     drawn: Draw = lambda rows, heads: aligned(rows, heads) + rest
     return fitted(names, heads, cells, results[:0:-1], width, drawn)
-
-
-def unit_of(name: str) -> str:
-    """The unit of a varied or critical quantity."""
-    try:
-        return "m" if name == "level" else parameters.parameter(name).unit
-    except InputError:
-        return ""  # strength, the efficiency of drains
 
 
 def short(name: str, cell: str) -> str:
