@@ -169,17 +169,11 @@ def refine_until_accurate(
         estimates = estimate_errors(tried[-3:], accuracy, step_errors)
         if all(estimate.within(accuracy) for estimate in estimates):
             why = ""
-            if not can_resolve(outcome.result, finest):
+            zones = [z for joint in outcome.result.joints for z in process_zone.too_short(joint)]
+            if not any(zone.least <= finest for zone in zones):  # resolved, or never on any mesh
                 break
     outcome.result.info["error_estimate"] = as_json(accuracy, tried, estimates, why)
     return outcome
-
-
-def can_resolve(result: Results, finest: float) -> bool:
-    """Whether a process zone has too few elements, but enough with the most along the joint."""
-    return any(
-        zone.least <= finest for joint in result.joints for zone in process_zone.too_short(joint)
-    )
 
 
 def refine_steps(

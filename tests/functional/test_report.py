@@ -490,12 +490,12 @@ def test_pages_of_the_report_as_pdf(command, checked, page_of_check, tmp_path, m
 def test_the_caption_of_maps_of_a_joint_has_no_colors_of_curves():
     def captions(name, **settings):
         solution = dj.run(dj.case(name, n_joint=6, h_dam=15, h_found=60, **settings)).solution
-        time = solution.result.last["time"]
-        return [caption for _, caption, _ in report.drawn(solution, time, "at level 40 m")]
+        return [caption for _, caption, _ in report.drawn(solution)]
 
     valley = captions("valley", levels=[40.0])
     assert "Joint at level 40 m." in valley and not [text for text in valley if "Red" in text]
-    assert any(text.startswith("Joint at level 40 m. Red: broken") for text in captions("dam"))
+    dam = captions("dam", levels=[40.0])
+    assert any(text.startswith("Joint at level 40 m. Red: broken") for text in dam)
 
 
 def test_a_pdf_whose_pictures_are_not_whole_is_not_written(command, checked, monkeypatch):

@@ -35,11 +35,6 @@ def row_of_joint(at: JointState, before: JointState) -> dict[str, float]:
     }
 
 
-def stress_at_nodes(at: JointState) -> Array:
-    """Effective normal stress (nodes,) [Pa] at the nodes of a joint, from heel to toe."""
-    return at.joint.mean_at_nodes(at.node_traction[:, 0])[np.argsort(at.joint.xi)]
-
-
 #: States whose displacement is stored: column of quake.csv and sign.
 PEAK_STATES = {
     "crest downstream": ("crest_ux", 1),
@@ -130,7 +125,8 @@ class QuakeHistory:
             forces = self.inertia[k] @ np.concatenate([motion.acceleration, step.ground])
             of_joint |= dict(zip(("T_inertia", "N_inertia", "M_inertia"), forces, strict=True))
             row |= {column_of(name, k): value for name, value in of_joint.items()}
-        stress = stress_at_nodes(joints[0])
+        first = joints[0].joint  # its effective normal stress from heel to toe
+        stress = first.mean_at_nodes(joints[0].node_traction[:, 0])[np.argsort(first.xi)]
         for name, values in self.rows.items():
             values.append(float(row[name]))
         self.stress.append(stress)

@@ -110,11 +110,6 @@ def unit_loads(space: Space, mesh: Mesh, name: str) -> Iterator[tuple[str, Array
                 yield f"{line}_{'xyz'[component]}", load
 
 
-def measured_load(case: Case) -> tuple[str, ...]:
-    """The region of the load whose work dissipation control needs."""
-    return (case["drive_load"],) if case["drive"] == "dissipation" else ()
-
-
 def unit_strains(case: Case) -> dict[str, tuple[str, Distribution]]:
     """Region and distribution of the thermal strains of a case, by name."""
     distributions: dict[str, Distribution] = {
@@ -157,7 +152,9 @@ class Bodies:
         mesh = mesh_of(case)
         start = time.perf_counter()
         by_name = {name: ElasticBody.of(case, mesh, name) for name in mesh.solids}
-        measured = (POINT,) * (POINT in mesh.bodies) + measured_load(case)
+        measured = (POINT,) * (POINT in mesh.bodies)
+        if case["drive"] == "dissipation":  # needs the work of this load
+            measured += (case["drive_load"],)
         seconds = time.perf_counter() - start
         return Bodies(mesh=mesh, by_name=by_name, seconds=seconds, measured=measured)
 

@@ -199,11 +199,6 @@ class UserGeometry:
         return [self.on_part(part) for part in self.unnamed if not part.names]
 
     @property
-    def gaps_of_support(self) -> list[str]:
-        """A position on each part of the surface that only fixed elements bound."""
-        return [self.on_part(part) for part in self.unnamed if part.names == {"fixed"}]
-
-    @property
     def fixed_concrete(self) -> float:
         """Length or area of the dam's surface that is fixed [m, m2]."""
         is_dam = np.array([name != "foundation" for name in self.solids])

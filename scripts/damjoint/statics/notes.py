@@ -194,8 +194,9 @@ def notes_on_geometry(case: Case, mesh: Mesh) -> Iterator[str]:
     if case["silt_height"] > 0 and (UP not in sides or case["silt_height"] <= lowest[UP]):
         yield f"silt_height = {case['silt_height']:g} m reaches no face upstream: no silt acts"
     yield from ends_beside_the_water(case, mesh)
-    for where in geometry.gaps_of_support:
-        yield f"fixed: has a gap at {where}, where the rock is free"
+    for part in geometry.unnamed:
+        if part.names == {"fixed"}:
+            yield f"fixed: has a gap at {geometry.on_part(part)}, where the rock is free"
     if fixed := geometry.fixed_concrete:
         yield f"fixed holds {fixed:.4g} {unit} of the dam's own surface"
     if where := geometry.coincident:

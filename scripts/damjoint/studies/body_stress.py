@@ -4,8 +4,6 @@ faces, pressure on the rock.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
@@ -18,8 +16,9 @@ from ..model.fields import Solution, along
 from ..pictures.drawing import GREY, panels
 from ..pictures.outline import Section, joint_lines, section_of, skin
 from ..pictures.run_picture import is_user_solid
+from ..post.field_files import principal
 from ..post.summary import Table, table_of
-from ..units import STRESSES, Units
+from ..units import METRES, STRESSES, Units
 from .check import SafetyCheck
 
 #: Distance from the ends of a joint, over its length, within which the stress of elastic bodies is
@@ -33,16 +32,8 @@ PATCH = 10
 SCALED = (2, 98)
 #: Ground shown around the dam, over its size.
 AROUND = 0.15
-METRES: Units = (("m", 1.0),)
 MEGAPASCAL = STRESSES[:1]
 ROCK = "foundation"
-
-
-def principal(stress: Array) -> Array:
-    """Principal stresses (n, 3), most compressive first, of (n, 6): xx, yy, zz, xy, yz, xz."""
-    xx, yy, zz, xy, yz, xz = stress.T
-    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
-    return np.linalg.eigvalsh(tensor)
 
 
 def corners(solution: Solution, time: float) -> list[tuple[Array, float]]:
@@ -94,45 +85,30 @@ def extremes(solution: Solution, time: float) -> Table:
     return table.beside("principal stress", names)
 
 
-@dataclass(frozen=True)
-class FacePoint:
-    """A point of a face (2,) [m], and the unit vector along the face there (2,)."""
-
-    place: Array
-    direction: Array
-
-
-def face_points(face: Array, heights: Array) -> list[FacePoint]:
-    """The points of a face (n, 2), from downstream to upstream, at heights (k,)."""
-    points = []
-    for height in heights:
-        y0, y1 = face[:-1, 1], face[1:, 1]
-        crossing = np.flatnonzero((np.minimum(y0, y1) <= height) & (height <= np.maximum(y0, y1)))
-        crossing = crossing[y0[crossing] != y1[crossing]]
-        if not len(crossing):
-            continue
-        start, end = face[crossing[0]], face[crossing[0] + 1]
-        part = (height - start[1]) / (end[1] - start[1])
-        along_face = (end - start) / np.linalg.norm(end - start)
-        points.append(FacePoint(start + part * (end - start), along_face))
-    return points
-
-
-def on_face(points: list[FacePoint], middles: Array, stress: Array) -> tuple[Array, Array]:
-    """The normal stress along the face, and that normal to it [Pa], at points of a face (k,): from
-    the plane through the stresses (n, 6) of the nearest elements, by their middles (n, 2).
+def face_at(face: Array, height: float) -> tuple[Array, Array] | None:
+    """The point (2,) [m] of a face (n, 2), from downstream to upstream, at a height, and the unit
+    vector (2,) along the face there; None if the face does not cross the height.
     """
-    tree, result = cKDTree(middles), list[tuple[float, float]]()
-    for point in points:
-        _, nearest = tree.query(point.place, min(PATCH, len(middles)))
-        away = middles[nearest] - point.place
-        basis = np.column_stack([np.ones(len(away)), away])
-        (xx, yy, _, xy, *_), *_ = np.linalg.lstsq(basis, stress[nearest], rcond=None)[0]
-        tensor, t = np.array([[xx, xy], [xy, yy]]), point.direction
-        n = np.array([-t[1], t[0]])
-        result.append((float(t @ tensor @ t), float(n @ tensor @ n)))
-    values = np.array(result).reshape(-1, 2)
-    return values[:, 0], values[:, 1]
+    y0, y1 = face[:-1, 1], face[1:, 1]
+    crosses = (np.minimum(y0, y1) <= height) & (height <= np.maximum(y0, y1)) & (y0 != y1)
+    if not crosses.any():
+        return None
+    start, end = face[crosses.argmax() :][:2]
+    part = (height - start[1]) / (end[1] - start[1])
+    return start + part * (end - start), (end - start) / np.linalg.norm(end - start)
+
+
+def on_face(point: Array, along: Array, middles: Array, stress: Array) -> tuple[float, float]:
+    """The normal stress along the face, and that normal to it [Pa], at a point of a face, see
+    `face_at`: from the plane through the stresses (n, 6) of the nearest elements, by their middles
+    (n, 2).
+    """
+    _, nearest = cKDTree(middles).query(point, min(PATCH, len(middles)))
+    away = middles[nearest] - point
+    basis = np.column_stack([np.ones(len(away)), away])
+    (xx, yy, _, xy, *_), *_ = np.linalg.lstsq(basis, stress[nearest], rcond=None)[0]
+    tensor, normal = np.array([[xx, xy], [xy, yy]]), np.array([-along[1], along[0]])
+    return float(along @ tensor @ along), float(normal @ tensor @ normal)
 
 
 def undeformed(solution: Solution, time: float) -> Section | None:
@@ -153,9 +129,8 @@ def faces(solution: Solution, time: float, section: Section) -> Table:
     for side, face in (("upstream", section.upstream), ("downstream", section.downstream)):
         tangential, normal = np.full((2, len(heights)), np.nan)
         for k, height in enumerate(heights):
-            on_point = on_face(face_points(face, np.array([height])), middles[:, :2], stress)
-            if len(on_point[0]):
-                tangential[k], normal[k] = on_point[0][0], on_point[1][0]
+            if found := face_at(face, height):
+                tangential[k], normal[k] = on_face(*found, middles[:, :2], stress)
         columns += [
             (f"{side}, along the face", tangential, MEGAPASCAL),
             (f"{side}, normal to it", normal, MEGAPASCAL),

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..pictures.check_picture import SIGN
 from ..post.summary import aligned, fitted
-from ..units import FORCES, MOMENTS, STRESSES, Units, unit
+from ..units import FORCES, METRES, MOMENTS, STRESSES, Units, unit
 from .check import (
     DIFFERENCE,
     FAIL,
@@ -32,12 +32,12 @@ SHOWN_DIFFERENCE = 1e-5
 
 #: Columns of the printed table: heading by name, in groups that share a unit.
 SHOWN: tuple[tuple[Units, dict[str, str]], ...] = (
-    ((("m", 1),), {"level": "level"}),
+    (METRES, {"level": "level"}),
     (FORCES, {"N": "N'", "T": "T", "U": "U"}),
     (MOMENTS, {"M": "M"}),
-    ((("m", 1),), {"x_resultant": "N' at x"}),
+    (METRES, {"x_resultant": "N' at x"}),
     (STRESSES, {"sigma_n_eff_heel": "eff. heel", "sigma_n_eff_toe": "eff. toe"}),
-    ((("m", 1),), {"crack_length": "crack"}),
+    (METRES, {"crack_length": "crack"}),
     (FORCES, {"cohesion": "c B", "cohesion_undamaged": "c L"}),
     ((("-", 1),), {"SSF": "SSF", "OSF": "OSF"}),
 )

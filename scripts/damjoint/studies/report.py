@@ -26,13 +26,14 @@ from ..pictures import run_picture
 from ..pictures.drawing import figure_of, picture_style
 from ..pictures.report_picture import Picture, bands, embedded
 from ..post import stored
+from ..post.folder import read_info
 from ..post.summary import Table, joints_note, joints_table, levels_table, table_of
 from ..post.validation import shown_time
 from ..statics.gravity import GravityMethod
 from ..statics.rigid_block import force, resultant_of
 from ..statics.verdict import stiffness_ratio
 from ..storage import atomic_write
-from ..units import FORCES, MOMENTS, Units, unit, unit_of_time
+from ..units import FORCES, METRES, MOMENTS, Units, unit, unit_of_time
 from . import body_stress, report_input, report_quake, report_studies
 from .check import (
     NOT_JUDGED,
@@ -59,7 +60,6 @@ SHUT_IN = 1.01
 MINUTE = "%Y-%m-%d %H:%M"
 #: A column for `table_of`: heading, values, units.
 Column = tuple[str, np.ndarray, Units]
-METRES: Units = (("m", 1.0),)
 MILLIMETRES: Units = (("mm", 1e3),)
 RATIO: Units = (("", 1.0),)
 
@@ -163,7 +163,10 @@ def write(folders: list[Path], to: Path, dam: str = "") -> None:
     not that of a run, or the file can not be written; RunError if weasyprint is not installed.
     """
     rendered = renderer(to)
-    paths = [path for folder in folders for path in sections_in(folder)]
+    paths = list[Path]()
+    for folder in folders:
+        runs = (run for part in parts_of(folder) for run in stored.runs_in(part))
+        paths += [folder] if is_study(folder) else runs
     inside = any(path.resolve() in to.resolve().parents for path in paths)
     if to.is_dir() or (inside and to.suffix.lower() not in (".html", ".pdf")):
         raise InputError(
@@ -227,14 +230,7 @@ class ErrorLog(logging.Handler):
 
 def is_study(path: Path) -> bool:
     """Whether a path is of a reliability or, as a CSV file, of a sweep; else of a run."""
-    return path.suffix == ".csv" or report_studies.is_reliability(path)
-
-
-def sections_in(path: Path) -> list[Path]:
-    """The runs and studies in a folder, or a study itself. Raises InputError."""
-    if is_study(path):
-        return [path]
-    return [run for part in parts_of(path) for run in stored.runs_in(part)]
+    return path.suffix == ".csv" or "reliability" in (read_info(path) or {})
 
 
 def page_of(sections: Sequence[RunSection | StudySection], dam: str = "") -> str:
@@ -347,7 +343,9 @@ def run_section(folder: Path, number: int, solution: Solution) -> RunSection:
             *info.get("notes", []),
             *(info.get("critical") or {}).get("gravity_method_notes", ()),
         ],
-        pictures=pictures_of(solution) if len(result.joint["time"]) else [],
+        pictures=[Picture(n, text, embedded(fig)) for n, text, fig in drawn(solution)]
+        if len(result.joint["time"])
+        else [],
         joints=[
             joint_section(joint, result.case.named((k,))) for k, joint in enumerate(result.joints)
         ],
@@ -608,17 +606,11 @@ def factored(case: Case, strength: str, unit: float) -> str:
     return f"{value / unit:.4g}" + (f"/{factor:.4g}" if factor != 1 else "")
 
 
-def pictures_of(solution: Solution) -> list[Picture]:
-    """Draw the pictures of a run."""
+def drawn(solution: Solution) -> Iterator[tuple[str, str, Figure]]:
+    """Yield the figures of a run: CSS class of the size, caption, figure."""
     result = solution.result
     time = shown_time(result)
     at_level = f"at level {result.state(time)['level']:.4g} m"
-    return [Picture(n, text, embedded(fig)) for n, text, fig in drawn(solution, time, at_level)]
-
-
-def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str, str, Figure]]:
-    """Yield the figures of a run: CSS class of the size, caption, figure."""
-    result = solution.result
     several = len(result.joints) > 1
     has_fields = bool(solution.fields)
     if has_fields:

@@ -20,7 +20,6 @@ from ..pictures.drawing import BLUE, DARK, ORANGE, figure_of, panels
 from ..pictures.report_picture import Picture, bands, embedded
 from ..post import stored
 from ..post.summary import Table, table_of
-from ..units import Units
 from . import quake_result, report_input
 
 #: Size of the picture of the spectra [inches], and their periods [s].
@@ -28,7 +27,6 @@ SPECTRUM = (10.6, 2.3)
 PERIODS = np.geomspace(0.03, 4.0, 80)
 #: Components of a record: name, column of quake.csv.
 COMPONENTS = ("horizontal", "ground_ax"), ("vertical", "ground_ay")
-RATIO: Units = (("", 1.0),)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from .. import InputError
 from ..input.parameters import of_any_joint
 from ..pictures.report_picture import Picture, bands
 from ..post import stored
-from ..post.folder import RECORD, read_info, read_record
+from ..post.folder import RECORD, read_record
 from ..post.summary import Table
 from . import report_input, sampling
 from .calibrate_study import RESIDUALS
@@ -57,11 +57,6 @@ class StudySection:
     other_input: dict[str, Entry]
     limits: list[str]
     versions: dict[str, str]
-
-
-def is_reliability(folder: Path) -> bool:
-    """Whether a folder is of `damjoint reliability`."""
-    return "reliability" in (read_info(folder) or {})
 
 
 def read(path: Path, number: int) -> StudySection:
@@ -228,7 +223,8 @@ def fragility(path: Path, info: Mapping[str, Any]) -> dict[str, Any]:
     """Answer, sentences, tables and picture of the fragility of a sweep."""
     with beside(path, FRAGILITY[0]).open(newline="", encoding="utf-8") as file:
         curves = [*csv.DictReader(file)]
-    about, (intensity, size) = info["sweep"], intensity_of(curves[0]["intensity"])
+    about, intensity = info["sweep"], curves[0]["intensity"]
+    size = INTENSITIES[intensity].replace("s2", "s²")
     varied = {n: listed(v) for n, v in about["vary"].items()}
     varied |= dict.fromkeys(about["sample"], "random")
     records = curves[0]["records"]
@@ -252,7 +248,7 @@ def fragility(path: Path, info: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "answer": "; ".join(medians) or "no curve",
         "sentences": [
-            f"Probability that an earthquake exceeds a limit, lognormal in the {intensity}; "
+            f"Probability that an earthquake exceeds a limit, lognormal in the {NAMES[intensity]}; "
             f"{sampling.CONFIDENCE:.0%} intervals {how}.",
             *(f"{c['limit']}: {c['reason']}." for c in curves if c["reason"]),
         ],
@@ -262,11 +258,6 @@ def fragility(path: Path, info: Mapping[str, Any]) -> dict[str, Any]:
         },
         "pictures": [Picture("full", "", bands(picture))] if picture.is_file() else [],
     }
-
-
-def intensity_of(name: str) -> tuple[str, str]:
-    """The name of an intensity and its unit. Raises LookupError."""
-    return NAMES[name], INTENSITIES[name].replace("s2", "s²")
 
 
 def listed(values: Sequence[Any]) -> str:
