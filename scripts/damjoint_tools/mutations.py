@@ -201,14 +201,6 @@ MUTATIONS = (
         having("turbulent"),
     ),
     Mutation(
-        "exponent 4/7 of turbulent flow in 3D: 1/2",
-        "joint/turbulence.py",
-        "EXPONENT = 4 / 7",
-        "EXPONENT = 1 / 2",
-        both(having("turbulent"), having("dim", 3)),
-        fields=True,
-    ),
-    Mutation(
         "G_t x 1.1",
         "laws/bond.py",
         'self.progress_per_slip = self.cohesion / (2 * p["G_t"])',
