@@ -366,28 +366,46 @@ class LimitState:
 
     def gradient(self, point: Any) -> list[list[float]]:
         """The derivatives (n, 1) of g with the normal variables at a point: by those of the
-        critical level, else central differences.
+        critical level, else differences: central, but at the medians, where the search begins.
         """
         variables, z = self.levels.variables, np.asarray(point, float)
-        self.evaluated([z])
-        try:
-            rates = self.levels.rates(self.joint, variables.values(z))
-        except BaseException as error:
-            self.error = error
-            raise
+        rates = self.rates(z)
         if rates is None:
             steps = STEP * np.eye(len(z))
-            values = np.ravel(self.evaluated([*(z + steps), *(z - steps)], False))
-            high, low = values.reshape(2, -1)
-            return [[float(slope)] for slope in (high - low) / (2 * STEP)]
+            others = z - steps if z.any() else z[None]
+            values = np.ravel(self.evaluated([*(z + steps), *others], False))
+            high, low = values[: len(z)], values[len(z) :]
+            return [[float(slope)] for slope in (high - low) / (STEP * (2 if z.any() else 1))]
         slopes = variables.slopes(z)
         of_level = {"level": -1.0}
         return [[slopes[n] * (rates | of_level).get(n, 0.0)] for n in variables.names]
 
+    def rates(self, z: Array) -> dict[str, float] | None:
+        """The derivatives of the critical level with the variables; None if it has none."""
+        self.evaluated([z])
+        try:
+            return self.levels.rates(self.joint, self.levels.variables.values(z))
+        except BaseException as error:
+            self.error = error
+            raise
+
     def hessian(self, point: Any) -> list[list[list[float]]]:
-        """The second derivatives (n, n, 1) of g: central differences of the first ones."""
+        """The second derivatives (n, n, 1) of g: central differences of the first ones; of values,
+        two more for each pair of variables, where the critical level has no derivatives.
+        """
         z = np.asarray(point, float)
         steps = STEP * np.eye(len(z))
+        if self.rates(z) is None:
+            i, j = np.triu_indices(len(z), 1)
+            pairs = steps[i] + steps[j]
+            points = [z, *(z + steps), *(z - steps), *(z + pairs), *(z - pairs)]
+            values = np.ravel(self.evaluated(points, False))
+            here, beside, both = np.split(values, [1, 1 + 2 * len(z)])
+            sums = beside.reshape(2, -1).sum(axis=0) - 2 * here
+            bends = np.diag(sums)
+            bends[i, j] = (both.reshape(2, -1).sum(axis=0) - 2 * here - sums[i] - sums[j]) / 2
+            bends[j, i] = bends[i, j]
+            return [[[float(bend)] for bend in row] for row in bends / STEP**2]
         self.evaluated([*(z + steps), *(z - steps)])  # in parallel
         rows = [np.ravel(self.gradient(z + s)) - np.ravel(self.gradient(z - s)) for s in steps]
         bends = np.array(rows) / (2 * STEP)
