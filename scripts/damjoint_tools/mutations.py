@@ -140,8 +140,8 @@ MUTATIONS = (
     Mutation(
         "square law for the cubic law of flow",
         "joint/water.py",
-        "return factor**3, np.where(growth > 0, 3 / self.narrowest * factor**2, 0)",
-        "return factor**2, np.where(growth > 0, 2 / self.narrowest * factor, 0)",
+        "water.scale * factor**3 * water.joint.points.weights",
+        "water.scale * factor**2 * water.joint.points.weights",
         having("uplift", "flow"),
     ),
     Mutation(
@@ -161,7 +161,7 @@ MUTATIONS = (
     Mutation(
         "voids from no pressure on",
         "joint/water.py",
-        'lowest=case["pressure_min"],',
+        'lowest=self.members[0].case["pressure_min"],',
         "lowest=0.0,",
         both(having("time_unit"), having("pressure_min")),
     ),
