@@ -13,16 +13,18 @@ displacement, is a mechanism.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from .. import ROUND_OFF
 from ..arrays import Array
 from ..input.case import Case
+from ..laws.base import Law
 from ..model.results import column_of
 from .controls import (
     BodyControl,
@@ -319,14 +321,35 @@ class Point:
         """Whether tension of more than the part FALL of the water's thrust has been lost since
         another equilibrium by points that soften in a single increment.
         """
-        equilibrium = self.model.equilibrium
+        tension = [law.tensile_strength for law in self.laws]
+        return self.lost(begin, tension, begun=False) > FALL * self.thrust
+
+    def hidden_rise(self, begin: Point) -> float:
+        """By how much the level may be higher between another equilibrium and this one [m]: up to
+        the strength that is lost by points that begin to soften in between.
+        """
+        none, strengths = np.zeros(1), list[float]()
+        for law in self.laws:
+            shear = float(law.shear_strength(none, none, none)[0])
+            strengths.append(law.tensile_strength + (shear if shear < np.inf else 0.0))
+        return self.level * self.lost(begin, strengths, begun=True) / self.thrust
+
+    @property
+    def laws(self) -> Sequence[Law[Any]]:
+        """The law of each joint."""
+        return self.model.equilibrium.laws.laws
+
+    def lost(self, begin: Point, strengths: Sequence[float], begun: bool) -> float:
+        """The strength [N] that points have lost since another equilibrium which soften by much in
+        the increment or, if begun is true, begin to; strengths [Pa]: of each joint.
+        """
         growth = self.damage - begin.damage
-        lost = equilibrium.interface.weights * np.where(growth > LARGEST_GROWTH, growth, 0)
+        counts = (growth > LARGEST_GROWTH) | (begun & (begin.damage == 0))
+        lost = self.model.equilibrium.interface.weights * np.where(counts, growth, 0)
         if not lost.any():
-            return False
-        parts = zip(equilibrium.laws.laws, self.state.variables.split(lost), strict=True)
-        force = sum(law.tensile_strength * part.sum() for law, part in parts if law.softens)
-        return bool(force > FALL * self.thrust)
+            return 0.0
+        parts = zip(self.laws, strengths, self.state.variables.split(lost), strict=True)
+        return float(sum(strength * part.sum() for law, strength, part in parts if law.softens))
 
     @property
     def thrust(self) -> float:
@@ -857,12 +880,23 @@ class EquilibriumPath:
         return first, max(possible, self.highest)
 
     def bound(self, first: int) -> float:
-        """An upper bound of the level [m] between a point and the next one, where the lines through
-        their neighbours meet; -inf where no point can be inserted.
+        """An upper bound of the level [m] between a point and the next one; -inf where no point can
+        be inserted.
         """
         a, b = self.points[first], self.points[first + 1]
         if b.control == "level" or first + 1 in self.starts or any(a is p for p in self.closed):
             return -np.inf
+        before, chord = self.slope(first - 1), (b.level - a.level) / (self.length(first) or 1.0)
+        # points that begin to soften may do so after a rise
+        hides = before is not None and before > max(chord, 0.0)
+        hidden = max(a.level, b.level) + b.hidden_rise(a) if hides else -np.inf
+        return max(self.bound_by_slopes(first), hidden)
+
+    def bound_by_slopes(self, first: int) -> float:
+        """An upper bound of the level [m] between a point and the next one, where the lines through
+        their neighbours meet.
+        """
+        a, b = self.points[first], self.points[first + 1]
         before, after = self.slope(first - 1), self.slope(first + 1)
         rise, length, ends = b.level - a.level, self.length(first), max(a.level, b.level)
         chord = rise / (length or 1.0)
