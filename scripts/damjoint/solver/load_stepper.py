@@ -302,13 +302,16 @@ class LoadStepper:
             dt *= 2 if accepted else self.case.shared["cut"][0]
             time = min(other.state.time + max(dt, smallest), end)
             dt = time - other.state.time
-            step = other.direct_step(time, dt < smallest * (1 + SAME_TIME))
-            accepted = bool(step and not other.leaps(step))
+            least = dt < smallest * (1 + SAME_TIME)
+            step = other.direct_step(time, least)
+            moves = bool(step and not least and other.moves_pressure(step))
+            accepted = bool(step and not moves and not other.leaps(step))
             if step and accepted:
                 other.accept(step, cuts=0)
         if self.model.damage_between(other.state, whole.state) <= SAME_DAMAGE:
             return False
         self.state, self.history = other.state, other.history
+        self.largest_move = other.largest_move
         self.on_step(end)
         return True
 
