@@ -260,7 +260,7 @@ def test_parameters_without_effect_are_named(command, tmp_path):
 
 def test_values_that_may_be_in_another_unit_are_named(command, tmp_path):
     """Not those of the package's cases, nor zero."""
-    write(tmp_path, "default_rho_dam = 24*kN/m3; default_mu = 38; default_adhesion = 0;")
+    write(tmp_path, "default_rho_dam = 24e3; default_mu = 38; default_adhesion = 0;")
     small = "--set", "n_joint=8", "--set", "order=1", "--no-fields", "--no-picture"
     words = *small, "--set", "law=friction", "--set", "mu=0.7", "--levels", "9"
     code, _, err = command("run", "mine.case", *words)

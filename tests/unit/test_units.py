@@ -106,6 +106,38 @@ def test_an_unknown_unit_is_refused_in_one_line(refused, parts):
     assert [part for part in parts if part not in text] == [] and "\n" not in text
 
 
+@pytest.mark.parametrize(
+    "setting, unit",
+    [
+        ("sigma_max=0.2*kN", "in Pa"),
+        ("ice_force=150*kN", "in N/m"),
+        ("time_unit=3*m", "in s"),
+        ("K_N=1e5*MPa*m", "in Pa/m"),
+        ("E_dam=20*GPa + 3*m", "in Pa"),
+        ("dam_height=45*m^2", "in m"),
+        ("mu=0.8*Pa", "without a unit"),
+    ],
+)
+def test_a_unit_that_does_not_fit_is_refused(setting, unit, command, tmp_path):
+    name, value = setting.split("=")
+    with pytest.raises(InputError) as error:
+        parameters.settings([setting])
+    assert str(error.value).startswith(f"{name} = {value}: must be {unit}")
+    (tmp_path / "my.case").write_text(f"default_{setting};\n")
+    code, _, err = command("run", "my.case")
+    assert code == 2 and "line 1: default_" in err and f": must be {unit}" in err
+
+
+def test_units_that_fit_in_another_way():
+    """Products and quotients; a force per area; numbers and other names have any unit."""
+    texts = ["2e-5*MN/m^2", "20*N/(m*m)", "0.02*kN/m2", "-(-20)*Pa", "20", "2*10"]
+    for text in texts:
+        assert parameters.settings([f"sigma_max={text}"])["sigma_max"] == pytest.approx(20)
+    assert parameters.settings(["visc=1e-3*Pa", "g=9.81*m", "storage=1*mm/MPa"])["visc"] == 1e-3
+    with pytest.raises(InputError, match=r"levels = 3\*Pa: must be in m, or without a unit"):
+        load("a", levels="3*Pa")
+
+
 def test_an_unknown_unit_in_a_case_file_is_refused(command, tmp_path):
     (tmp_path / "my.case").write_text("default_mu = 1;\ndefault_E_dam = 20*Gpa;\n")
     code, _, err = command("run", "my.case")

@@ -10,7 +10,8 @@ import warnings
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
-from .. import data, meant
+from .. import InputError, data, meant
+from ..units import with_slash
 
 BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
@@ -25,6 +26,19 @@ UNARY: dict[type[ast.unaryop], Callable[[float], float]] = {
 }
 
 PI = {"Pi": math.pi}
+#: Powers of length, mass, temperature and angle.
+Powers = tuple[float, ...]
+#: Those in the SI units. Seconds are not counted: they have no unit that can be written.
+POWERS: dict[str, Powers] = {
+    "m": (1, 0, 0, 0),
+    "m2": (2, 0, 0, 0),
+    "m3": (3, 0, 0, 0),
+    "N": (1, 1, 0, 0),
+    "Pa": (-1, 1, 0, 0),
+    "kg": (0, 1, 0, 0),
+    "K": (0, 0, 1, 0),
+    "degrees": (0, 0, 0, 1),
+}
 #: Numbers and powers in Python only: 1_000, 0x10, 2**3.
 PYTHON_ONLY = r"\b\d+[_xXoObB]|\*\*"
 
@@ -45,9 +59,71 @@ def explained(message: str, error: Exception) -> str:
 @lru_cache(maxsize=1)
 def units() -> dict[str, float]:
     """SI values of the units by name, from pro/units.pro; an angle's in degrees."""
-    text = re.sub(r"//[^\n]*", "", (data("pro") / "units.pro").read_text())
-    pairs = re.findall(r"(\w+) = ([^;]+);", text)
-    return {name: value_of(parsed(value), PI) for name, value in pairs}
+    return {name: value_of(parsed(value), PI) for name, value, _ in declared_units()}
+
+
+def declared_units() -> list[tuple[str, str, str]]:
+    """Name, value and SI unit of each unit of pro/units.pro."""
+    text = (data("pro") / "units.pro").read_text()
+    return re.findall(r"(?m)^(\w+) = ([^;]+);  // (\w+)$", text)
+
+
+@lru_cache(maxsize=1)
+def powers_of_units() -> dict[str, Powers]:
+    """Powers of length, mass, temperature and angle in each unit."""
+    return {name: POWERS[unit] for name, _, unit in declared_units()}
+
+
+@lru_cache(maxsize=64)
+def powers_of_label(unit: str) -> Powers:
+    """Powers of length, mass, temperature and angle in a label's unit: N per m, Pa s per m, -."""
+    above, _, below = unit.partition("per ")
+    signs = [(1, word) for word in above.split()] + [(-1, word) for word in below.split()]
+    counted = [(sign, POWERS[word]) for sign, word in signs if word in POWERS]
+    return tuple(sum(sign * powers[i] for sign, powers in counted) for i in range(4))
+
+
+def check_unit(text: str, unit: str, message: str) -> None:
+    """Check that the units in an expression make up the unit of a label. Numbers alone do; names
+    that are no units may have any.
+
+    Raises InputError with the message if they do not.
+    """
+    node = parsed(text)
+    names = {part.id for part in ast.walk(node) if isinstance(part, ast.Name)} - set(PI)
+    if not names or names - set(units()):
+        return
+    try:
+        fits = powers(node) in (None, powers_of_label(unit))
+    except ValueError:
+        fits = False
+    if not fits:
+        wanted = "without a unit" if unit == "-" else f"in {with_slash(unit)}, or without a unit"
+        raise InputError(f"{message}: must be {wanted}")
+
+
+def powers(node: ast.expr) -> Powers | None:
+    """Powers of the units in an expression, None without any. Raises ValueError for a sum of
+    different ones, or where an exponent has units.
+    """
+    if isinstance(node, ast.UnaryOp):
+        return powers(node.operand)
+    if not isinstance(node, ast.BinOp):
+        return powers_of_units().get(node.id) if isinstance(node, ast.Name) else None
+    left, right = powers(node.left), powers(node.right)
+    if isinstance(node.op, (ast.Add, ast.Sub)):
+        if left and right and left != right:
+            raise ValueError("a sum of different units")
+        return left or right
+    if isinstance(node.op, ast.Pow):
+        if right:
+            raise ValueError("an exponent with a unit")
+        return left and tuple(p * value_of(node.right, PI) for p in left)
+    if not (left or right):
+        return None
+    sign = -1 if isinstance(node.op, ast.Div) else 1
+    pairs = zip(left or [0] * 4, right or [0] * 4, strict=True)
+    return tuple(a + sign * b for a, b in pairs)
 
 
 def arithmetic_value(text: str, known: Mapping[str, float] | None = None) -> float:

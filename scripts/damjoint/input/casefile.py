@@ -33,8 +33,17 @@ from typing import TypeAlias
 from .. import InputError, data
 from ..arrays import Value
 from ..storage import text_of
-from .arithmetic import arithmetic_value, explained
-from .parameters import GEOMETRY_LISTS, TEXTS, Parameter, assignments, checked, declared, parameter
+from .arithmetic import arithmetic_value, check_unit, explained
+from .parameters import (
+    GEOMETRY_LISTS,
+    TEXTS,
+    Parameter,
+    assignments,
+    checked,
+    declared,
+    parameter,
+    unit_in_list,
+)
 
 LISTS = ("levels", "tail_levels", "times", *GEOMETRY_LISTS)
 #: Most bytes of a case file.
@@ -186,7 +195,8 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
         if name == "lift_heights":
             keep_first_block(case)
     elif name in LISTS and tokens[1:4] == ("(", ")", "="):
-        case.lists[name] = numbers(items_of(kinds[4:], tokens[4:], where), case, where)
+        items, unit = items_of(kinds[4:], tokens[4:], where), unit_in_list(name)
+        case.lists[name] = [evaluate(item, unit, case, where) for _, item in items]
         note_owner(case, name, path)
     elif tokens[:3] == ("Struct", "Joint", "::"):
         add_block(case, kinds, tokens, path, where)
@@ -333,26 +343,22 @@ def items_of(kinds: tuple[str, ...], tokens: tuple[str, ...], where: str) -> lis
     return [(kinds[a:b], tokens[a:b]) for a, b in zip(starts, ends, strict=True)]
 
 
-def numbers(items: list[Item], case: CaseText, where: str) -> list[float]:
-    """The values of a list of numbers."""
-    return [evaluate(tokens, case, where) for _, tokens in items]
-
-
 def value_in(item: Item, known: Parameter, case: CaseText, where: str) -> Value:
     """A text or the value of an arithmetic expression, for a parameter."""
     kinds, tokens = item
     if known.text and kinds != ("text",):
         raise InputError(f"{where}: must be a text in quotes, {known.allowed()}")
-    return tokens[0][1:-1] if kinds == ("text",) else evaluate(tokens, case, where)
+    return tokens[0][1:-1] if kinds == ("text",) else evaluate(tokens, known.unit, case, where)
 
 
-def evaluate(tokens: tuple[str, ...], case: CaseText, where: str) -> float:
-    """The value of an arithmetic expression."""
+def evaluate(tokens: tuple[str, ...], unit: str, case: CaseText, where: str) -> float:
+    """The value of an arithmetic expression in the unit of a label."""
     if len(tokens) == 1 and PLAIN.fullmatch(tokens[0]):
         return float(tokens[0])
     known = {f"default_{n}": v for n, v in case.defaults.items() if isinstance(v, float)}
+    text = " ".join(tokens)
     try:
-        return arithmetic_value(" ".join(tokens), known)
+        value = arithmetic_value(text, known)
     except ValueError as error:
         message = (
             f"{where}: must be a number, or arithmetic with + - * / ^ ( ), Pi, units and defaults "
@@ -360,3 +366,5 @@ def evaluate(tokens: tuple[str, ...], case: CaseText, where: str) -> float:
         )
         message += "; a decimal number has a point, not a comma" if "," in tokens else ""
         raise InputError(explained(message, error)) from None
+    check_unit(text, unit, where)
+    return value

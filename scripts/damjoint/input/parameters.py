@@ -20,7 +20,7 @@ from .. import InputError, __version__, data, meant
 from ..arrays import Setting, Value
 from ..laws import LAWS
 from ..storage import atomic_write, cached
-from .arithmetic import explained, quantity
+from .arithmetic import check_unit, explained, quantity
 
 DECLARATIONS = data("pro") / "parameters.pro"
 #: The line by which a text includes the declarations.
@@ -142,6 +142,8 @@ class Parameter:
                 result = quantity(value) if isinstance(value, str) else float(value)
             except (TypeError, ValueError) as error:
                 raise InputError(explained(message, error)) from None
+            if isinstance(value, str):
+                check_unit(value, self.unit, f"{self.name} = {value}")
         if not self.allows(result):
             raise InputError(message)
         return result
@@ -433,7 +435,14 @@ def levels_of(name: str, levels: Any) -> tuple[float, ...]:
         raise InputError(explained(message, error)) from None
     if not result or not all(map(math.isfinite, result)):
         raise InputError(message)
+    for text in (value for value in values if isinstance(value, str)):
+        check_unit(text, unit_in_list(name), f"{name} = {text.strip()}")
     return result
+
+
+def unit_in_list(name: str) -> str:
+    """The unit of the numbers in a list of a case."""
+    return "-" if name == "times" else "m"
 
 
 def assignments(values: Mapping[str, Value]) -> str:
