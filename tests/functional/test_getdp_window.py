@@ -137,8 +137,9 @@ def run_in_gmsh(project, name, settings):
 
 
 def assert_as_in_python(rows, case, folder):
-    """Compare the joints' last rows with the default engine's, of the same model."""
-    engine = "getdp" if case["dim"] == 3 else "auto"
+    """Compare the joints' last rows with those of a run from Python, of the same model."""
+    # under a point's force N is a small rest of tension and compression, other in each engine
+    engine = "getdp" if case["dim"] == 3 or case["drive"] == "point" else "auto"
     (result, *_) = runner.run(case, folder, False, False, False, engine)
     joints = result.joints or [result]
     assert len(rows) == len(joints)

@@ -344,12 +344,20 @@ def of_point(point: Point, names: Sequence[str]) -> list[Sensitivity]:
                 "point is about to open, slip or break, or the crack grows unstably; search it "
                 "again with another value"
             )
+        # near a kink: also those for a larger value, as in `of_run`
+        near = [name for name, kink in zip(names, end.kink, strict=True) if kink]
+        larger = dict[str, float]()
+        if near:
+            (other,), _ = Differentiation(point.model, near, True).along(trace.updates)
+            larger = dict(zip(near, other.level.tolist(), strict=True))
         for k, name in enumerate(names):
             value, *_ = half_difference(point.model.case, name)
-            given = {"critical_level": float(end.level[k])}
-            if np.isfinite(end.level[k]):
-                at = float(point.state.time), float(point.level)
-                rows.append(Sensitivity(name, value, *at, given, bool(end.kink[k])))
+            given, at = float(end.level[k]), (float(point.state.time), float(point.level))
+            above = larger.get(name, given)
+            kink = not abs(above - given) <= ONE_SIDED * max(abs(above), abs(given))
+            given = above if kink and np.isfinite(above) else given
+            if np.isfinite(given):
+                rows.append(Sensitivity(name, value, *at, {"critical_level": given}, kink))
     if not rows:
         raise RunError(f"sensitivity: no derivative with {', '.join(names)} is found, at a kink")
     return rows
