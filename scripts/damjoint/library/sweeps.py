@@ -191,7 +191,7 @@ def sweep(
     from ..studies.sweep import PlannedRows
 
     check_jobs(jobs)
-    if not values and not sample:
+    if not (values or sample) or any(isinstance(v, Mapping) for v in values.values()):
         raise InputError("sweep: must have values or a sample, such as mu=[0.8, 1.0]")
     axes = [(name, listed(name, np.atleast_1d(np.array(v)).tolist())) for name, v in values.items()]
     plan = plan_with(axes, list((tie or {}).items()), sample, {}, critical)
