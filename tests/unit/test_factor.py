@@ -125,3 +125,15 @@ def test_without_a_compiler_there_is_superlu(tmp_path, monkeypatch):
         assert not list(tmp_path.iterdir())
     finally:
         factor.library.cache_clear()
+
+
+def test_without_a_cache_nothing_is_left_of_what_is_compiled(tmp_path, monkeypatch):
+    if factor.is_slow():
+        pytest.skip("MUMPS")
+    monkeypatch.setattr(factor, "INSTALLED", tmp_path / "none")
+    monkeypatch.setattr(factor.tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setenv("DAMJOINT_CACHE", "")
+    factor.library.cache_clear()
+    mumps = factor.library()
+    factor.library.cache_clear()
+    assert mumps.damjoint_mumps_version and not list(tmp_path.iterdir())

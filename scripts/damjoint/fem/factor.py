@@ -51,13 +51,16 @@ INSTALLED = Path(sys.prefix) / "lib" / "damjoint"
 @cache
 def library() -> ctypes.CDLL | None:
     """mumps.c as a library, by `make setup` or compiled into the cache; None: it can not be."""
-    parent = cache_folder() or Path(tempfile.mkdtemp(prefix="damjoint"))
-    for folder in (INSTALLED, parent):
+    cached = cache_folder()
+    for folder in (INSTALLED, cached) if cached else (INSTALLED,):
         # OSError: not compiled yet, or for a MUMPS that is no longer installed
         with contextlib.suppress(OSError):
             if folder is INSTALLED or is_whole(folder / file_name()):
                 return ctypes.CDLL(str(folder / file_name()))
-    return compile_into(parent)
+    if cached:
+        return compile_into(cached)
+    with tempfile.TemporaryDirectory(prefix="damjoint-") as folder_name:  # it stays loaded
+        return compile_into(Path(folder_name))
 
 
 @contextlib.contextmanager
