@@ -408,6 +408,45 @@ def test_bad_input_is_refused(command, tmp_path, words, message):
 
 
 @pytest.mark.heavy
+def test_a_level_beyond_unstable_growth_is_not_confirmed_if_other_ways_do_not_lead_there():
+    """Random dam 112-5, from a lower first level: the crack of a lift runs through from 8.002 m;
+    the friction beyond it bears 8.505 m, which was confirmed beside 8.002 m.
+    """
+    settings = {
+        "dam_height": 5.1,
+        "order": 2.0,
+        "n_joint": 20.0,
+        "mesh_pattern": "free",
+        "dam_base": 4.96,
+        "dam_crest": 0.864,
+        "E": 43600000000.0,
+        "nu": 0.21,
+        "found_side": 5.1,
+        "found_depth": 5.1,
+        "law": ("friction", "friction", "bond"),
+        "K_N": (294000000.0, 30000000000000.0, 169000000.0),
+        "sigma_max": (0.0, 0.0, 0.0),
+        "adhesion": (238000.0, 725000.0, 229000.0),
+        "mu": (0.44, 0.827, 0.231),
+        "K_T": (450000000.0, 14800000000000.0, 252000000.0),
+        "pena_tang": (22500000.0, 740000000000.0, -1.0),
+        "uplift": ("imposed", "none", "cracked"),
+        "weight_first": 0.0,
+        "lift_heights": (1.953, 4.025),
+        "G_f": (-1.0, -1.0, 31.6),
+        "G_t": (2000.0, 2000.0, 6930.0),
+        "joint_slope": (0.0, 0.0, 0.0),
+        "aperture_min": (1e-05, 1.79e-05, 6.52e-07),
+        "drains": (0.0, 0.0, 1.0),
+        "drain_x": (1.43, 0.417, 0.59),
+        "softening": "exponential",
+    }
+    _, answer = search_result("dam", "level", settings, [2.285], "1.07")
+    assert answer.value > 8.49 and not answer.confirmed
+    assert answer.doubt.startswith("between ")
+
+
+@pytest.mark.heavy
 def test_a_limit_point_confirms_another_quantity_than_the_level(solve):
     """The path with a lighter dam falls before any mechanism; shorter increments do the same."""
     settings = {"law": "rupture", "uplift": "cracked", "n_joint": 10.0}

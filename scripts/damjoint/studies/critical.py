@@ -320,6 +320,10 @@ class Search:
             if ends_in_crack and certain:  # each point that the water reaches turns the path
                 other = self.from_beginning(path, share=1.0, case=lower_begin(path.case))
                 certain = other is None
+        beyond_growth = not path.to_growth and path.growth_until(path.top + 1) is not None
+        if beyond_growth and result.why and certain:  # another way may end before that growth
+            other = self.otherwise(path)
+            certain = other is None
         if path.begun_by_run and point is path.points[0]:
             result = replace(result, why="", doubt=falls_at_once(point))
         if path.water_withdraws:
