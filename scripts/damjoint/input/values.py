@@ -79,6 +79,11 @@ def level_unknown(values: Values | ParameterValues) -> bool:
     return values["drive"] != "level" and values["drive_load"] == "level"
 
 
+def factor_unknown(values: Values | ParameterValues) -> bool:
+    """Whether the factor of a load is unknown, and a displacement prescribed."""
+    return values["drive"] != "level" and values["drive_load"] != "level"
+
+
 def has_point(values: Values | ParameterValues) -> bool:
     """Whether the displacement of a point is prescribed or, under dissipation control, recorded."""
     return values["drive"] in ("point", "dissipation")

@@ -44,24 +44,10 @@ class Tangent:
     flow: FlowDerivative | None = None
     flowing: tuple[Flow, ...] = ()
 
-    @property
-    def lift(self) -> CsrMatrix:
-        """See `lift_of`."""
-        return lift_of(self.flowing)
-
 
 def lift_of(flowing: tuple[Flow, ...]) -> CsrMatrix:
     """Nodal forces of the pressures of flowing water (j, p)."""
     return stacked([part.lift.T for part in flowing]).T
-
-
-def matrix_of(assembly: Assembly, stiffness: Array, tangent: Tangent) -> Array:
-    """S + K (j, j); stiffness: S (j, j)."""
-    matrix = stiffness.copy()
-    assembly.whole(tangent.law).add_to(matrix)
-    if flow := tangent.flow:
-        matrix[:, flow.columns] -= tangent.lift @ flow.pressure
-    return matrix
 
 
 @dataclass(frozen=True)
@@ -109,7 +95,7 @@ class DenseSystem:
         return lu_solve(self.matrix(tangent), right), 0.0
 
     def matrix(self, tangent: Tangent) -> Array:
-        """S + K (j, j), as `matrix_of`, faster for few unknowns."""
+        """S + K (j, j), by dense products, which are faster for few unknowns."""
         matrix = self.stiffness + self.assembly.dense(tangent.law)
         if flow := tangent.flow:
             matrix[:, flow.columns] -= self.lift(tangent.flowing) @ flow.pressure
@@ -130,7 +116,9 @@ class WoodburySystem:
 
     def matrix(self) -> Array:
         """A_0 (j, j)."""
-        return matrix_of(self.assembly, self.stiffness, Tangent(self.undamaged))
+        matrix = self.stiffness.copy()
+        self.assembly.whole(self.undamaged).add_to(matrix)
+        return matrix
 
     @cached_property
     def small_matrix(self) -> Array | None:

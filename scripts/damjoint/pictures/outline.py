@@ -78,6 +78,11 @@ def boundary(points: np.ndarray, faces: list[np.ndarray]) -> np.ndarray:
     return np.array(max(loops, key=len))
 
 
+def area_between(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Area (n,) of the parallelograms of vectors (n, 2), > 0 if the second is to the left."""
+    return first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+
+
 @dataclass
 class PlaneBody:
     """A body in the plane: points (n, 2) [m] undeformed and displaced (exaggerated), faces by
@@ -94,7 +99,7 @@ class PlaneBody:
         """Centroid of the displaced outline, by the shoelace formula (2,) [m]."""
         start = self.moved[self.loop]
         end = np.roll(start, -1, axis=0)
-        cross = start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]
+        cross = area_between(start, end)
         return cross @ (start + end) / (3 * cross.sum())
 
     def nearest(self, place: np.ndarray) -> int:

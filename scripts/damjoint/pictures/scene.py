@@ -25,7 +25,7 @@ from ..model.loads import COMPLETE, Loading, line_forces, thermal_strains
 from ..model.results import Results
 from ..statics import gravity
 from ..units import FORCES, STRESSES, with_unit
-from .outline import Section, exaggeration, joint_lines, section_of, skin
+from .outline import Section, area_between, exaggeration, joint_lines, section_of, skin
 
 #: Sides of a section below water: of the reservoir, of water on the crest, of the tailwater.
 RESERVOIR, OVER, TAIL = (UP, FLOOR), (TOP,), (BED, DOWN)
@@ -389,11 +389,6 @@ def water_surface(bodies: Mapping[str, Body], level: float) -> list[Array]:
         for cell in cells
         if cell is not None
     ]
-
-
-def area_between(first: Array, second: Array) -> Array:
-    """Area (n,) of the parallelograms of vectors (n, 2), > 0 if the second is to the left."""
-    return first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
 
 
 def ground_heights(ground: Body, places: Array) -> Array:

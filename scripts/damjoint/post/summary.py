@@ -11,11 +11,11 @@ import numpy as np
 
 from .. import ROUND_OFF
 from ..input.case import Case
-from ..input.values import flows_in_time
+from ..input.values import factor_unknown, flows_in_time
 from ..model.results import Results
 from ..statics import gravity
 from ..statics.verdict import sliding_factor
-from ..units import FLUXES, FORCES, LENGTHS, MOMENTS, Units, unit, unit_of_time
+from ..units import FLUXES, FORCES, LENGTHS, MOMENTS, NUMBER, Units, unit, unit_of_time
 
 #: Columns of the summary: name in the history, heading, units.
 SHOWN: tuple[tuple[str, str, Units], ...] = (
@@ -34,7 +34,6 @@ SHOWN: tuple[tuple[str, str, Units], ...] = (
     ("crest_ux", "crest movement", LENGTHS),
     ("flux", "leakage", FLUXES),
 )
-NUMBER: Units = (("", 1.0),)
 
 
 class Table(NamedTuple):
@@ -94,12 +93,11 @@ def levels_table(result: Results, displacements: Units | None = None) -> Table:
         after = history["time"][rows] - case["time_start"]
         seconds = np.where(after > -ROUND_OFF, after * case["time_unit"], np.nan)
         first = [("time", seconds, (unit_of_time(np.nanmax(seconds, initial=0.0)),))]
-    if case["drive"] != "level":
-        if case["drive_load"] != "level":
-            first.append((f"{case['drive_load']} factor", history["load_factor"][rows], NUMBER))
-        if "point_u" in history:
-            moved = history["point_u"][rows]
-            first.append(("point movement", moved, units_shown(LENGTHS, displacements)))
+    if factor_unknown(case):
+        first.append((f"{case['drive_load']} factor", history["load_factor"][rows], NUMBER))
+    if case["drive"] != "level" and "point_u" in history:
+        moved = history["point_u"][rows]
+        first.append(("point movement", moved, units_shown(LENGTHS, displacements)))
     names, sizes, cells = table_of(
         first
         + [
@@ -189,7 +187,7 @@ def text(result: Results, width: int | None = None) -> str:
     shown = aligned(table.rows, table.stacked, left=1)
     note = joints_note(case)
     at = f"level {last['level']:.4g} m"
-    if case["drive"] != "level" and case["drive_load"] != "level":
+    if factor_unknown(case):
         at += f", {case['drive_load']} factor {last['load_factor']:.4g}"
     joints = f"joints at {at}:\n{shown}" + (f"\n{note}" if note else "")
     if width is not None:

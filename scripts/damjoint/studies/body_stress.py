@@ -98,13 +98,13 @@ def face_at(face: Array, height: float) -> tuple[Array, Array] | None:
     return start + part * (end - start), (end - start) / np.linalg.norm(end - start)
 
 
-def on_face(point: Array, along: Array, middles: Array, stress: Array) -> tuple[float, float]:
+def on_face(point: Array, along: Array, tree: cKDTree, stress: Array) -> tuple[float, float]:
     """The normal stress along the face, and that normal to it [Pa], at a point of a face, see
-    `face_at`: from the plane through the stresses (n, 6) of the nearest elements, by their middles
-    (n, 2).
+    `face_at`: from the plane through the stresses (n, 6) of the nearest elements, of the tree
+    of their middles (n, 2).
     """
-    _, nearest = cKDTree(middles).query(point, min(PATCH, len(middles)))
-    away = middles[nearest] - point
+    _, nearest = tree.query(point, min(PATCH, tree.n))
+    away = tree.data[nearest] - point
     basis = np.column_stack([np.ones(len(away)), away])
     (xx, yy, _, xy, *_), *_ = np.linalg.lstsq(basis, stress[nearest], rcond=None)[0]
     tensor, normal = np.array([[xx, xy], [xy, yy]]), np.array([-along[1], along[0]])
@@ -125,12 +125,13 @@ def faces(solution: Solution, time: float, section: Section) -> Table:
     low, high = section.heel[1], section.crest[:, 1].max()
     heights = low + np.array(HEIGHTS) * (high - low)
     middles, stress = stress_of(solution, time, rock=False)
+    tree = cKDTree(middles[:, :2])
     columns: list[tuple[str, Array, Units]] = [("y", heights, METRES)]
     for side, face in (("upstream", section.upstream), ("downstream", section.downstream)):
         tangential, normal = np.full((2, len(heights)), np.nan)
         for k, height in enumerate(heights):
             if found := face_at(face, height):
-                tangential[k], normal[k] = on_face(*found, middles[:, :2], stress)
+                tangential[k], normal[k] = on_face(*found, tree, stress)
         columns += [
             (f"{side}, along the face", tangential, MEGAPASCAL),
             (f"{side}, normal to it", normal, MEGAPASCAL),

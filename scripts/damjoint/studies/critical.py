@@ -316,8 +316,9 @@ class Search:
             result = replace(result, growth=point.level)
         elif not result.why:
             result = with_end_of(path, result)
-            ends_in_crack = path.entering and result.why == end_of_branch(path)
-            if ends_in_crack and certain:  # each point that the water reaches turns the path
+            if (
+                path.entering and path.branch_ends and certain
+            ):  # each point that the water reaches turns the path
                 other = self.from_beginning(path, share=1.0, case=lower_begin(path.case))
                 certain = other is None
         beyond_growth = not path.to_growth and path.growth_until(path.top + 1) is not None
@@ -668,7 +669,7 @@ def with_end_of(path: FailurePath, result: CriticalValue) -> CriticalValue:
         return replace(result, why=lost_beyond_limit(path), doubt="")
     if path.stops and path.loses_drains:
         return replace(result, doubt=end_at_drains(path))
-    return replace(result, why=end_of_branch(path), doubt="") if path.stops else result
+    return replace(result, why=end_of_branch(path), doubt="") if path.branch_ends else result
 
 
 def lower_begin(case: Case) -> Case:

@@ -196,6 +196,12 @@ class FailurePath(EquilibriumPath):
         return self.stops and not self.entering
 
     @property
+    def branch_ends(self) -> bool:
+        """Whether nothing is known of its end but that no increment, however short, leads on."""
+        known = self.ends_at_strength or self.falls or self.loses_drains
+        return self.stops and not known
+
+    @property
     def loses_drains(self) -> bool:
         """Whether a crack that reaches the drains of a joint takes their effect."""
         return any(j["uplift"] == "cracked" and has_drains(j) for j in self.case.joints)

@@ -33,7 +33,7 @@ from ..statics.gravity import GravityMethod
 from ..statics.rigid_block import force, resultant_of
 from ..statics.verdict import stiffness_ratio
 from ..storage import atomic_write
-from ..units import FORCES, METRES, MOMENTS, Units, unit, unit_of_time
+from ..units import FORCES, METRES, MOMENTS, NUMBER, Units, unit, unit_of_time
 from . import body_stress, report_input, report_quake, report_studies
 from .check import (
     NOT_JUDGED,
@@ -61,7 +61,6 @@ MINUTE = "%Y-%m-%d %H:%M"
 #: A column for `table_of`: heading, values, units.
 Column = tuple[str, np.ndarray, Units]
 MILLIMETRES: Units = (("mm", 1e3),)
-RATIO: Units = (("", 1.0),)
 
 #: Columns of the summary: name, heading, units. A column without values is left out.
 SUMMARY: tuple[tuple[str, str, Units], ...] = (
@@ -71,12 +70,12 @@ SUMMARY: tuple[tuple[str, str, Units], ...] = (
     ("T", "T", FORCES),
     ("x_resultant", "N' at x", METRES),
     ("crack_length", "crack", METRES),
-    ("SSF", "SSF", RATIO),
-    ("SSF_gravity", "SSF gravity", RATIO),
-    ("SSF_required", "SSF required", RATIO),
-    ("OSF", "OSF", RATIO),
-    ("OSF_gravity", "OSF gravity", RATIO),
-    ("OSF_required", "OSF required", RATIO),
+    ("SSF", "SSF", NUMBER),
+    ("SSF_gravity", "SSF gravity", NUMBER),
+    ("SSF_required", "SSF required", NUMBER),
+    ("OSF", "OSF", NUMBER),
+    ("OSF_gravity", "OSF gravity", NUMBER),
+    ("OSF_required", "OSF required", NUMBER),
 )
 
 

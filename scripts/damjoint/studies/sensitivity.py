@@ -346,21 +346,26 @@ def of_point(point: Point, names: Sequence[str]) -> list[Sensitivity]:
             )
         # near a kink: also those for a larger value, as in `of_run`
         near = [name for name, kink in zip(names, end.kink, strict=True) if kink]
-        larger = dict[str, float]()
+        larger = dict[str, dict[str, float]]()
         if near:
-            (other,), _ = Differentiation(point.model, near, True).along(trace.updates)
-            larger = dict(zip(near, other.level.tolist(), strict=True))
-        for k, name in enumerate(names):
+            (other,), _ = Differentiation(point.model, near, one_sided=True).along(trace.updates)
+            larger = dict(zip(near, map(of_level, other.level.tolist()), strict=True))
+        for name, rate in zip(names, end.level.tolist(), strict=True):
             value, *_ = half_difference(point.model.case, name)
-            given, at = float(end.level[k]), (float(point.state.time), float(point.level))
-            above = larger.get(name, given)
-            kink = not abs(above - given) <= ONE_SIDED * max(abs(above), abs(given))
-            given = above if kink and np.isfinite(above) else given
-            if np.isfinite(given):
-                rows.append(Sensitivity(name, value, *at, {"critical_level": given}, kink))
+            row = of_level(rate)
+            above = larger.get(name, row)
+            kink = differ(row, above, {"critical_level": 0.0})
+            if row or above:
+                at = float(point.state.time), float(point.level)
+                rows.append(Sensitivity(name, value, *at, (kink and above) or row, kink))
     if not rows:
         raise RunError(f"sensitivity: no derivative with {', '.join(names)} is found, at a kink")
     return rows
+
+
+def of_level(rate: float) -> dict[str, float]:
+    """The derivative of a critical level, if it is found."""
+    return {"critical_level": rate} if np.isfinite(rate) else {}
 
 
 def table(rows: Sequence[Sensitivity]) -> dict[str, list[Value]]:

@@ -20,7 +20,7 @@ from ..post.summary import Table, aligned, fitted, table_of
 from ..runner import compute
 from ..statics import gravity
 from ..statics.verdict import verdict
-from ..units import LENGTHS, with_unit
+from ..units import LENGTHS, NUMBER, with_unit
 
 #: Parameters by which a run can be repeated; factors of their values.
 NAMES = "K_N", "K_T"
@@ -89,7 +89,7 @@ def table(runs: Sequence[tuple[str, Results | str]]) -> tuple[Table, list[str]]:
             labels.append((label, result.case.named((k,)), verdict(result)))
             rows.append(state_of(joint))
     columns = [(head, np.array([row[name] for row in rows]), units) for name, head, units in SHOWN]
-    columns.append(("SSF", np.array([row["SSF"] for row in rows]), (("", 1.0),)))
+    columns.append(("SSF", np.array([row["SSF"] for row in rows]), NUMBER))
     cells = table_of(columns)
     several = any(joint for _, joint, _ in labels)
     heads = ["run", *(["joint"] if several else [])]
