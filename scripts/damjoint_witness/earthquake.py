@@ -322,21 +322,29 @@ def momentum(joint: Shaken, steps: Table) -> Iterator[str]:
 
 
 def after(joint: Shaken, steps: Table) -> Iterator[str]:
-    """Check the static state after the earthquake: N + U and T by hand; that there is one if the
-    rigid block certainly stands.
-    """
+    """Check the static state after the earthquake: N + U and T by hand."""
     found = joint.found.get("after")
-    if found is None:
-        return
-    if not found["equilibrium"]:
-        last = Joint(joint.files, joint.asked, joint.number, at_points(joint, steps)[0][-1])
-        if equilibrium_is_certain(last):
-            yield "no equilibrium after the earthquake, but there certainly is one"
+    if not found or not found["equilibrium"]:
         return
     row, hand = joint.static_row(after=True), joint.by_hand()
     for name, value, exact in (("T", row["T"], hand[0]), ("N + U", row["N"] + row["U"], hand[1])):
         if abs(value - exact) > 10 * MOMENTUM_TOLERANCE * joint.size:
             yield f"after the earthquake {name} = {value:.6g} N/m, by hand {exact:.6g}"
+
+
+def standing(whole: Shaken, steps: Table) -> Iterator[str]:
+    """Check that there is a static state after the earthquake if the rigid block on every joint
+    certainly stands.
+    """
+    found = whole.found.get("after")
+    if not found or found["equilibrium"]:
+        return
+    last = (
+        Joint(joint.files, joint.asked, joint.number, at_points(joint, steps)[0][-1])
+        for joint in whole.joints
+    )
+    if all(map(equilibrium_is_certain, last)):
+        yield "no equilibrium after the earthquake, but there certainly is one"
 
 
 def frames(joint: Shaken, steps: Table) -> Iterator[str]:
@@ -391,6 +399,7 @@ def violations(whole: Shaken, steps: Table) -> Iterator[str]:
     """All rules that the files of an earthquake violate but those of the laws, in words."""
     yield from bookkeeping(whole)
     yield from motion(whole)
+    yield from standing(whole, steps)
     for joint in whole.joints:
         yield from frames(joint, steps)
         prefix = f"joint {joint.number + 1}: "

@@ -56,6 +56,15 @@ def test_the_files_of_an_earthquake_violate_no_rule(files):
     assert np.ptp(rows["T_inertia"]) > 0.5 * files.shaken.size
 
 
+@pytest.mark.parametrize("certain, found", [((True, True), 1), ((True, False), 0)])
+def test_a_dam_stands_if_it_certainly_does_on_every_joint(files, monkeypatch, certain, found):
+    """On one joint it may, while another one slides away (random earthquake 141-213)."""
+    whole, steps = files.shaken, read_table(files.files.folder / "steps.csv")
+    monkeypatch.setitem(whole.files.record["quake"], "after", {"equilibrium": False})
+    monkeypatch.setattr(witness_of_quakes, "equilibrium_is_certain", lambda j: certain[j.number])
+    assert len(list(witness_of_quakes.standing(whole, steps))) == found
+
+
 @pytest.mark.parametrize(
     "name, wrong, part",
     [
