@@ -74,12 +74,15 @@ def require(holds: object, name: str, value: float | str, rule: str) -> None:
 
 
 def meant(word: str, known: Iterable[str], most: int = 3) -> str:
-    """Return "did you mean ...?" with the known names nearest a word; empty if none is near."""
+    """Return "did you mean ...?" with the known names nearest a word, those that it begins first;
+    empty if none is near.
+    """
     import difflib
 
     names = list(known)
     near = [name for name in names if name.lower() == word.lower()]
-    near = near or difflib.get_close_matches(word, names, most)
+    begun = [name for name in names if len(word) > 2 and name.lower().startswith(word.lower())]
+    near = near or list(dict.fromkeys(begun + difflib.get_close_matches(word, names, most)))[:most]
     return f"did you mean {' or '.join(near)}?" if near else ""
 
 

@@ -148,10 +148,10 @@ def test_a_parameter_out_of_range_is_refused(refused, setting, allowed):
         ),
         (
             (
-                *("run", "e", "--set", "time_unit=60", "--set", "drains=1"),
+                *("run", "e", "--set", "time_unit=60", "--set", "pressure_step=1e4"),
                 *("--engine", "getdp"),
             ),
-            ("time_unit = 60", "must be 0", "engine = getdp", "drains = 1"),
+            ("time_unit = 60", "must be 0", "engine = getdp", "pressure_step = 10000"),
         ),
         ((*RUN, "--out", "o\udcff"), (r"'o\udcff'", "must be text", "LANG=C.UTF-8")),
         ((*RUN, "--steps", "0"), ("steps = 0", "integer >= 1")),

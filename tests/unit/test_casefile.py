@@ -194,6 +194,7 @@ def test_every_preset_fits_a_dam(tmp_path, path):
         (LIFTS + "default_mu = 1;", "must stand before the blocks of joints that set mu"),
         ("Struct Joint::base [ mu 1, mu 2 ];", "mu is set twice"),
         ("Struct Joint::base [ muh 1 ];", "muh: unknown parameter; did you mean mu?"),
+        ("default_drain_eff = 1;", "did you mean drain_effectiveness or "),
         ("Struct Joint::base [ E 1e10 ];", "E: is of the whole dam: must be set by default_E"),
         ("Struct Joint::base [ mu ];", "must be a number"),
         ("Struct Joint::base [ mu -1 ];", "mu = -1.0: must be a number > 0"),
