@@ -11,7 +11,8 @@ from damjoint.engines.getdp.process import find_getdp
 from damjoint.input import casefile, parameters
 from damjoint.input.arithmetic import units
 from damjoint.input.resolve import load
-from damjoint.studies.plan import plan_of, sample_of
+from damjoint.studies.calibrate import free_of
+from damjoint.studies.plan import plan_of, sample_of, tie, values_of
 
 UNITS = data("pro") / "units.pro"
 CASE = (
@@ -126,6 +127,27 @@ def test_a_unit_that_does_not_fit_is_refused(setting, unit, command, tmp_path):
     (tmp_path / "my.case").write_text(f"default_{setting};\n")
     code, _, err = command("run", "my.case")
     assert code == 2 and "line 1: default_" in err and f": must be {unit}" in err
+
+
+@pytest.mark.parametrize(
+    "refused, message",
+    [
+        (lambda: values_of("sigma_max=1*kPa,2*kN"), "sigma_max = 2*kN: must be in Pa"),
+        (lambda: values_of("level=1:3*Pa:1"), "--vary level=1:3*Pa:1: must be in m"),
+        (lambda: tie("adhesion", "2*kN/m", {}), "--tie adhesion=2*kN/m: must be in Pa"),
+        (
+            lambda: sample_of(["2", "E_dam=normal(20*GPa, scale=1*kN)"]),
+            "--sample E_dam=normal(20*GPa, scale=1*kN): must be in Pa",
+        ),
+        (
+            lambda: free_of(load("a"), ["K_N=1e9:1e13*Pa"]),
+            "--free K_N=1e9:1e13*Pa: must be in Pa/m",
+        ),
+    ],
+)
+def test_a_unit_that_does_not_fit_is_refused_in_all_options(refused, message):
+    with pytest.raises(InputError, match=re.escape(f"{message}, or without a unit")):
+        refused()
 
 
 def test_units_that_fit_in_another_way():

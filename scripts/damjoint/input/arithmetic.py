@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
-from .. import InputError, data, meant
+from .. import data, meant
 from ..units import with_slash
 
 BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
@@ -51,9 +51,21 @@ class UnknownName(ValueError):
         super().__init__(f"{name} is unknown ({hint})")
 
 
-def explained(message: str, error: Exception) -> str:
-    """A message, with the unknown name if that is the error."""
-    return f"{message}; {error}" if isinstance(error, UnknownName) else message
+class WrongUnit(ValueError):
+    """Units in an expression that do not make up that of its label."""
+
+    def __init__(self, unit: str) -> None:
+        kind = "" if unit == "-" else f"in {with_slash(unit)}, or "
+        super().__init__(f"must be {kind}without a unit")
+
+
+def explained(setting: str, rule: str, error: Exception) -> str:
+    """The message on a setting that is no arithmetic: "setting: rule; name is unknown", or what
+    its unit must be.
+    """
+    if isinstance(error, WrongUnit):
+        return f"{setting}: {error}"
+    return f"{setting}: {rule}; {error}" if isinstance(error, UnknownName) else f"{setting}: {rule}"
 
 
 @lru_cache(maxsize=1)
@@ -83,23 +95,17 @@ def powers_of_label(unit: str) -> Powers:
     return tuple(sum(sign * powers[i] for sign, powers in counted) for i in range(4))
 
 
-def check_unit(text: str, unit: str, message: str) -> None:
-    """Check that the units in an expression make up the unit of a label. Numbers alone do; names
-    that are no units may have any.
-
-    Raises InputError with the message if they do not.
+def fits(node: ast.expr, unit: str) -> bool:
+    """Whether the units in an expression make up the unit of a label; empty: any. Numbers alone
+    do; names that are no units may have any.
     """
-    node = parsed(text)
     names = {part.id for part in ast.walk(node) if isinstance(part, ast.Name)} - set(PI)
-    if not names or names - set(units()):
-        return
+    if not unit or not names or names - set(units()):
+        return True
     try:
-        fits = powers(node) in (None, powers_of_label(unit))
+        return powers(node) in (None, powers_of_label(unit))
     except ValueError:
-        fits = False
-    if not fits:
-        wanted = "without a unit" if unit == "-" else f"in {with_slash(unit)}, or without a unit"
-        raise InputError(f"{message}: must be {wanted}")
+        return False
 
 
 def powers(node: ast.expr) -> Powers | None:
@@ -126,20 +132,28 @@ def powers(node: ast.expr) -> Powers | None:
     return tuple(a + sign * b for a, b in pairs)
 
 
-def arithmetic_value(text: str, known: Mapping[str, float] | None = None) -> float:
-    """The value of arithmetic with numbers, + - * / ^ ( ), Pi, units and known names: 20*GPa.
+def arithmetic_value(text: str, unit: str = "", known: Mapping[str, float] | None = None) -> float:
+    """The value of arithmetic with numbers, + - * / ^ ( ), Pi, units and known names: 20*GPa; unit:
+    of its label, see `fits`.
+
+    Raises ValueError, for example UnknownName, WrongUnit.
+    """
+    node = parsed(text)
+    value = value_of(node, PI | units() | dict(known or {}))
+    if not fits(node, unit):
+        raise WrongUnit(unit)
+    return value
+
+
+def quantity(text: str, unit: str = "") -> float:
+    """The value of a number, also nan or inf, or of arithmetic in the unit of a label.
 
     Raises ValueError.
     """
-    return value_of(parsed(text), PI | units() | dict(known or {}))
-
-
-def quantity(text: str) -> float:
-    """The value of a number, also nan or inf, or of arithmetic with units. Raises ValueError."""
     try:
         return number(text)
     except ValueError:
-        return arithmetic_value(text)
+        return arithmetic_value(text, unit)
 
 
 def number(text: str) -> float:
@@ -194,9 +208,9 @@ def value_of(node: ast.expr, known: Mapping[str, float]) -> float:
     return number
 
 
-def call_of(text: str) -> tuple[str, list[float], dict[str, float]]:
+def call_of(text: str, unit: str) -> tuple[str, list[float], dict[str, float]]:
     """Name, arguments and named arguments of 'name(1, 2, scale=3)', all of them numbers or
-    arithmetic with units.
+    arithmetic in the unit of a label.
 
     Raises ValueError.
     """
@@ -204,6 +218,10 @@ def call_of(text: str) -> tuple[str, list[float], dict[str, float]]:
     if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
         raise ValueError(text)
     known = PI | units()
+    if not all(
+        fits(value, unit) for value in [*node.args, *(word.value for word in node.keywords)]
+    ):
+        raise WrongUnit(unit)
     named = {word.arg: value_of(word.value, known) for word in node.keywords if word.arg}
     if len(named) < len(node.keywords):
         raise ValueError(text)

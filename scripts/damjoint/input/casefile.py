@@ -33,7 +33,7 @@ from typing import TypeAlias
 from .. import InputError, data
 from ..arrays import Value
 from ..storage import text_of
-from .arithmetic import arithmetic_value, check_unit, explained
+from .arithmetic import arithmetic_value, explained
 from .parameters import (
     GEOMETRY_LISTS,
     TEXTS,
@@ -356,15 +356,11 @@ def evaluate(tokens: tuple[str, ...], unit: str, case: CaseText, where: str) -> 
     if len(tokens) == 1 and PLAIN.fullmatch(tokens[0]):
         return float(tokens[0])
     known = {f"default_{n}": v for n, v in case.defaults.items() if isinstance(v, float)}
-    text = " ".join(tokens)
     try:
-        value = arithmetic_value(text, known)
+        return arithmetic_value(" ".join(tokens), unit, known)
     except ValueError as error:
-        message = (
-            f"{where}: must be a number, or arithmetic with + - * / ^ ( ), Pi, units and defaults "
-            "set before"
+        rule = (
+            "must be a number, or arithmetic with + - * / ^ ( ), Pi, units and defaults set before"
         )
-        message += "; a decimal number has a point, not a comma" if "," in tokens else ""
-        raise InputError(explained(message, error)) from None
-    check_unit(text, unit, where)
-    return value
+        rule += "; a decimal number has a point, not a comma" if "," in tokens else ""
+        raise InputError(explained(where, rule, error)) from None

@@ -20,7 +20,7 @@ from .. import InputError, __version__, data, meant
 from ..arrays import Setting, Value
 from ..laws import LAWS
 from ..storage import atomic_write, cached
-from .arithmetic import check_unit, explained, quantity
+from .arithmetic import explained, quantity
 
 DECLARATIONS = data("pro") / "parameters.pro"
 #: The line by which a text includes the declarations.
@@ -135,17 +135,15 @@ class Parameter:
 
         Raises InputError if it is not a number, out of range or not one of the choices.
         """
-        message = f"{self.name} = {value}: must be {self.allowed()} ({self.meaning})"
+        setting, rule = f"{self.name} = {value}", f"must be {self.allowed()} ({self.meaning})"
         result: Value = value
         if not self.text:
             try:
-                result = quantity(value) if isinstance(value, str) else float(value)
+                result = quantity(value, self.unit) if isinstance(value, str) else float(value)
             except (TypeError, ValueError) as error:
-                raise InputError(explained(message, error)) from None
-            if isinstance(value, str):
-                check_unit(value, self.unit, f"{self.name} = {value}")
+                raise InputError(explained(setting, rule, error)) from None
         if not self.allows(result):
-            raise InputError(message)
+            raise InputError(f"{setting}: {rule}")
         return result
 
     def allows(self, value: Value) -> bool:
@@ -428,15 +426,14 @@ def levels_of(name: str, levels: Any) -> tuple[float, ...]:
     values = levels.split(",") if isinstance(levels, str) else levels
     listed = levels if isinstance(levels, str) else ",".join(map(str, levels))
     kind = "x,y of each corner in metres" if name == "downstream_face" else "levels in metres"
-    message = f"{name} = {listed}: must be a list of {kind}, such as 3,6,8,9"
+    setting, rule = f"{name} = {listed}", f"must be a list of {kind}, such as 3,6,8,9"
+    unit = unit_in_list(name)
     try:
-        result = tuple(quantity(v) if isinstance(v, str) else float(v) for v in values)
+        result = tuple(quantity(v, unit) if isinstance(v, str) else float(v) for v in values)
     except (TypeError, ValueError) as error:
-        raise InputError(explained(message, error)) from None
+        raise InputError(explained(setting, rule, error)) from None
     if not result or not all(map(math.isfinite, result)):
-        raise InputError(message)
-    for text in (value for value in values if isinstance(value, str)):
-        check_unit(text, unit_in_list(name), f"{name} = {text.strip()}")
+        raise InputError(f"{setting}: {rule}")
     return result
 
 

@@ -137,7 +137,7 @@ def free(case: Case, name: str, limits: str | None) -> Free:
         if not low <= start <= high:
             raise InputError(f"{text}: must start at a value, {name} = {start:g}")
     elif limits is not None:
-        low, high = limits_of(text, limits)
+        low, high = limits_of(text, limits, declared.unit)
         low, high = max(low, declared.minimum), min(high, declared.maximum)
         if not low <= start <= high:
             raise InputError(f"{text}: must contain the start value, {name} = {start:g}")
@@ -154,15 +154,15 @@ def free(case: Case, name: str, limits: str | None) -> Free:
     return Free(name, start, low, high, positive, scale, prior)
 
 
-def limits_of(text: str, limits: str) -> tuple[float, float]:
-    """The numbers of LOW:HIGH. Raises InputError."""
-    bad = f"{text}: must be LOW:HIGH, normal(MEAN,SD) or lognorm(S,0,MEDIAN)"
+def limits_of(text: str, limits: str, unit: str) -> tuple[float, float]:
+    """The numbers of LOW:HIGH in a unit. Raises InputError."""
+    rule = "must be LOW:HIGH, normal(MEAN,SD) or lognorm(S,0,MEDIAN)"
     try:
-        low, high = (quantity(part) for part in limits.split(":"))
+        low, high = (quantity(part, unit) for part in limits.split(":"))
     except ValueError as error:
-        raise InputError(explained(bad, error)) from None
+        raise InputError(explained(text, rule, error)) from None
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise InputError(bad)
+        raise InputError(f"{text}: {rule}")
     return low, high
 
 
@@ -170,7 +170,7 @@ def prior_of(text: str, name: str, words: str) -> tuple[float, float, bool]:
     """Mean and standard deviation of a normal prior; of a lognormal one those of the logarithm, and
     True. Raises InputError.
     """
-    frozen = sampling.distribution(name, words, "--free")
+    frozen = sampling.distribution(name, words, "--free", parameters.parameter(name).unit)
     kind = words.partition("(")[0].strip()
     if kind in ("normal", "norm"):
         return float(frozen.mean()), float(frozen.std()), False

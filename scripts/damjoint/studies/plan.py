@@ -80,7 +80,7 @@ class Sample:
             known = None if name == "level" else parameters.of_any_joint(name)
             if known and (known.text or known.choices):
                 raise InputError(f"--sample {name}={text}: must be of a parameter that is a number")
-            sampling.distribution(name, text)
+            sampling.distribution(name, text, unit=quantity_of(name)[1])
         for text in self.correlate:
             sampling.correlation(text, [*self.distributions])
 
@@ -121,13 +121,13 @@ def checked(name: str, value: Value) -> Value:
         if "." in name:
             return parameters.of_one_joint(name, value)[2]
         return parameters.parameter(name).check(value)
-    message = f"level = {value}: must be a level in metres"
+    setting, rule = f"level = {value}", "must be a level in metres"
     try:
-        level = quantity(value) if isinstance(value, str) else value
+        level = quantity(value, "m") if isinstance(value, str) else value
     except ValueError as error:
-        raise InputError(explained(message, error)) from None
+        raise InputError(explained(setting, rule, error)) from None
     if not math.isfinite(level):
-        raise InputError(message)
+        raise InputError(f"{setting}: {rule}")
     return level
 
 
@@ -153,23 +153,24 @@ def listed(name: str, values: Sequence[Value | Path]) -> list[Value]:
 def values_of(text: str) -> tuple[str, list[Value]]:
     """('name', [v1, ...]) from 'name=v1,v2,...' or 'name=first:last:step'. Raises InputError."""
     name, equals, values = text.partition("=")
-    bad = InputError(
-        f"--vary {text}: must be NAME=V1,V2,... or NAME=FIRST:LAST:STEP with a step that leads "
-        "from first to last"
+    setting = f"--vary {text}"
+    rule = (
+        "must be NAME=V1,V2,... or NAME=FIRST:LAST:STEP with a step that leads from first to last"
     )
+    bad = InputError(f"{setting}: {rule}")
     if not equals or not values:
         raise bad
     name = name.strip()
     if ":" not in values:
         return name, [checked(name, v.strip()) for v in values.split(",")]
     try:
-        first, last, step = (quantity(v) for v in values.split(":"))
+        first, last, step = (quantity(v, quantity_of(name)[1]) for v in values.split(":"))
     except ValueError as error:
-        raise InputError(explained(str(bad), error)) from None
+        raise InputError(explained(setting, rule, error)) from None
     if not np.isfinite([first, last, step]).all() or step == 0 or (last - first) / step < 0:
         raise bad
     if (last - first) / step >= MOST_ROWS:
-        raise InputError(f"--vary {text}: must give at most {MOST_ROWS} values")
+        raise InputError(f"{setting}: must give at most {MOST_ROWS} values")
     number = int((last - first) / step + ROUNDING) + 1
     return name, [checked(name, rounded(first + i * step)) for i in range(number)]
 
@@ -332,13 +333,13 @@ def tie(name: str, expression: str, row: Values) -> Value:
     """The value of an expression of a row's values. Raises InputError."""
     known = {other: value for other, value in row.items() if not isinstance(value, str)}
     try:
-        value = rounded(arithmetic_value(expression, known))
+        value = rounded(arithmetic_value(expression, quantity_of(name)[1], known))
     except ValueError as error:
-        message = (
-            f"--tie {name}={expression}: must be arithmetic with + - * / ^ ( ), Pi, units and the "
-            f"names varied, sampled or tied before ({', '.join(known)})"
+        rule = (
+            "must be arithmetic with + - * / ^ ( ), Pi, units and the names varied, sampled or "
+            f"tied before ({', '.join(known)})"
         )
-        raise InputError(explained(message, error)) from None
+        raise InputError(explained(f"--tie {name}={expression}", rule, error)) from None
     return checked(name, value)
 
 

@@ -29,18 +29,21 @@ MOST_ITERATIONS = 30
 TOLERANCE = 1e-4
 
 
-def distribution(name: str, text: str, option: str = "--sample") -> stats.distributions.rv_frozen:
+def distribution(
+    name: str, text: str, option: str = "--sample", unit: str = ""
+) -> stats.distributions.rv_frozen:
     """The distribution of 'normal(1.0, 0.15)': a name of scipy.stats with its shapes, loc, scale.
-    option: that has it, for messages.
+    option: that has it, for messages; unit: of its numbers, empty: any.
 
     Raises InputError.
     """
-    message = f"{option} {name}={text}: must be a distribution of scipy.stats with numbers"
+    setting, rule = f"{option} {name}={text}", "must be a distribution of scipy.stats with numbers"
+    message = f"{setting}: {rule}"
     try:
-        kind, numbers, named = call_of(text)
+        kind, numbers, named = call_of(text, unit)
     except ValueError as error:
-        message += ", such as normal(1.0,0.15) or uniform(0.5,scale=0.3)"
-        raise InputError(explained(message, error)) from None
+        rule += ", such as normal(1.0,0.15) or uniform(0.5,scale=0.3)"
+        raise InputError(explained(setting, rule, error)) from None
     if kind not in DISTRIBUTIONS:
         known = "normal, lognorm, truncnorm, uniform, triang, weibull_min, gumbel_r, beta, ..."
         raise InputError(f"{message}; {kind} is none; known: {known}")

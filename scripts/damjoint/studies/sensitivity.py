@@ -158,7 +158,7 @@ def deviations_of(distributions: Mapping[str, str]) -> dict[str, float]:
 
     result = dict[str, float]()
     for name, text in distributions.items():
-        result[name] = float(distribution(name, text, "--vary").std())
+        result[name] = float(distribution(name, text, "--vary", of_any_joint(name).unit).std())
         if not np.isfinite(result[name]):
             raise InputError(f"--vary {name}={text}: must have a finite standard deviation")
     return result
