@@ -6,7 +6,7 @@ import operator
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from itertools import pairwise
 from typing import Any
 
@@ -401,7 +401,7 @@ class WaterSystem:
         """Scalar fields on the joints."""
         return self.flow.fields if self.network else self.members[0].joint.fields
 
-    def _ends(self, loading: Loading) -> tuple[Array, IntArray]:
+    def heads_of_ends(self, loading: Loading) -> tuple[Array, IntArray]:
         """Of a network that branches: heads [m] at its ends, in an array of all nodes, and the dry
         ends, where water leaves at the head of their own elevation, but does not enter.
         """
@@ -425,7 +425,7 @@ class WaterSystem:
             for water in self.members:
                 heads[water.nodes] = water.head(loading)
             return heads
-        at_ends, exits = self._ends(loading)
+        at_ends, exits = self.heads_of_ends(loading)
         if not len(self.fields.ends):
             return at_ends
         return at_ends + self.flow.solve(self.flow.points.weights, at_ends, exits=exits).pressure
@@ -485,44 +485,7 @@ class WaterSystem:
                 for water, factor in zip(self.members, factors, strict=True)
             ]
         )
-        head, weight, exits = self.heads(loading), self.unit_weight, NO_NODES
-        imposed = at_ends = weight * head
-        if self.branched:
-            ends, exits = self._ends(loading)
-            at_ends = weight * ends
-
-        def solved(
-            conductivity: Array, nodes: IntArray, outlet: Array, step: TimeStep | None = step
-        ) -> FlowSolution:
-            flow_by = (
-                self.flow_in_time(step, factors, imposed, at_ends, nodes, weight * outlet)
-                if step
-                else lambda conductivity: steady(conductivity, nodes, outlet)
-            )
-            if not self.turbulent.any():
-                return flow_by((self.reference if step else 1) * conductivity)
-            like = len(nodes), step.part if step else 0
-            per_gradient = 2 * self.reference * conductivity / self.flow.points.weights
-            per_gradient *= self.members[0].case["rho_water"] / self.members[0].case["visc"]
-            per_gradient *= self.turbulent
-            solution, last = turbulent_flow(
-                flow_by,
-                (self.reference if step else 1) * conductivity,
-                per_gradient,
-                self.last_slowed.get(like),
-            )
-            self.last_slowed[like] = last
-            return solution
-
-        def steady(conductivity: Array, nodes: IntArray, outlet: Array) -> FlowSolution:
-            if not len(self.fields.ends):  # at rest
-                return FlowSolution(pressure=0 * at_ends[self.fields.inside], systems=[])
-            solution = self.flow.solve(conductivity, at_ends, nodes, weight * outlet, exits)
-            if self.branched:
-                beyond = solution.pressure + (at_ends - imposed)[self.fields.inside]
-                return replace(solution, pressure=beyond)
-            return solution
-
+        flow = FlowAtLoading(self, factors, loading)
         all_drains = [
             water.drainage(*at)
             for water, at in zip(self.members, opened, strict=True)
@@ -532,27 +495,21 @@ class WaterSystem:
         if effect is None:
             effect = self.drain_effectiveness
         without, fully = step.of_parts if step and 0 < effect < 1 else (step, step)
-        free = solved(conductivity, NO_NODES, np.zeros(0), without)
+        free = flow.solve(conductivity, *NO_DRAINS, without)
         if not acting or effect == 0:
             return free
-        nodes, outlet = outlets(acting, loading)
-
-        def act_on(free: FlowSolution) -> bool:
-            at_drains = head[nodes] + self.expand_to_nodes(free)[nodes] / weight
-            # voids at the pressure of the outlet give no water, nor do drains fill them
-            least = ROUNDING * np.abs(head).max() if step else 0.0
-            return bool((at_drains > outlet + least).all())
-
+        drains = outlets(acting, loading)
         if without is not fully:
-            drained = solved(conductivity, NO_NODES, np.zeros(0), fully)
-            if act_on(drained):
-                drained = solved(conductivity, nodes, outlet, fully)
+            drained = flow.solve(conductivity, *NO_DRAINS, fully)
+            if flow.is_above(*drains, drained, fully):
+                drained = flow.solve(conductivity, *drains, fully)
             assert isinstance(free, FlowInTime) and isinstance(drained, FlowInTime)
             return replace(free.mixed(effect, drained), parts=(free, drained))
-        if not act_on(free):
+        if not flow.is_above(*drains, free, step):
             return free
-        if all(drains.remaining == 1 for drains in acting):
-            return free.mixed(effect, solved(conductivity, nodes, outlet))
+        if all(line.remaining == 1 for line in acting):
+            return free.mixed(effect, flow.solve(conductivity, *drains, step))
+        solved = partial(flow.solve, step=step)
         return self.with_fading(free, acting, effect, conductivity, loading, solved, before_quake)
 
     def with_fading(
@@ -746,6 +703,67 @@ class WaterSystem:
         ]
         stored = self.flow.points.weights * np.concatenate(growth) / step.seconds
         return self.flow.derivative(solution, self.reference * np.concatenate(rates), stored)
+
+
+#: See `outlets`.
+NO_DRAINS = NO_NODES, np.zeros(0)
+
+
+class FlowAtLoading:
+    """The flow of the water of a system under a loading, at given apertures."""
+
+    def __init__(self, system: WaterSystem, factors: list[Array], loading: Loading) -> None:
+        """factors: see `WaterSystem.volume_by`."""
+        self.system, self.factors, self.exits = system, factors, NO_NODES
+        self.head, weight = system.heads(loading), system.unit_weight
+        self.imposed = self.at_ends = weight * self.head
+        if system.branched:
+            ends, self.exits = system.heads_of_ends(loading)
+            self.at_ends = weight * ends
+
+    def solve(
+        self, conductivity: Array, nodes: IntArray, outlet: Array, step: TimeStep | None
+    ) -> FlowSolution:
+        """The flow by conductivities (q,) times weights of the points, over those of the closed
+        first joint; nodes, outlet: of drains, see `outlets`; step: see `WaterSystem.solve`.
+        """
+        system, drained = self.system, self.system.unit_weight * outlet
+        flow_by = (
+            system.flow_in_time(step, self.factors, self.imposed, self.at_ends, nodes, drained)
+            if step
+            else lambda conductivity: self.steady(conductivity, nodes, drained)
+        )
+        laminar = (system.reference if step else 1) * conductivity
+        if not system.turbulent.any():
+            return flow_by(laminar)
+        like = len(nodes), step.part if step else 0
+        per_gradient = 2 * system.reference * conductivity / system.flow.points.weights
+        per_gradient *= system.members[0].case["rho_water"] / system.members[0].case["visc"]
+        per_gradient *= system.turbulent
+        solution, system.last_slowed[like] = turbulent_flow(
+            flow_by, laminar, per_gradient, system.last_slowed.get(like)
+        )
+        return solution
+
+    def steady(self, conductivity: Array, nodes: IntArray, drained: Array) -> FlowSolution:
+        """The same without time and turbulence; drained: pressures at the drains [Pa]."""
+        fields, at_ends = self.system.fields, self.at_ends
+        if not len(fields.ends):  # at rest
+            return FlowSolution(pressure=0 * at_ends[fields.inside], systems=[])
+        solution = self.system.flow.solve(conductivity, at_ends, nodes, drained, self.exits)
+        if self.system.branched:
+            beyond = solution.pressure + (at_ends - self.imposed)[fields.inside]
+            return replace(solution, pressure=beyond)
+        return solution
+
+    def is_above(
+        self, nodes: IntArray, outlet: Array, free: FlowSolution, step: TimeStep | None
+    ) -> bool:
+        """Whether the heads of a flow without drains are above their outlets, so that they act."""
+        beyond = self.system.expand_to_nodes(free)[nodes] / self.system.unit_weight
+        # voids at the pressure of the outlet give no water, nor do drains fill them
+        least = ROUNDING * np.abs(self.head).max() if step else 0.0
+        return bool((self.head[nodes] + beyond > outlet + least).all())
 
 
 def outlets(drains: list[Drainage], loading: Loading) -> tuple[IntArray, Array]:
