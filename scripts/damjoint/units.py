@@ -10,6 +10,7 @@ Units = tuple[tuple[str, float], ...]
 
 LENGTHS: Units = (("m", 1), ("mm", 1e3), ("µm", 1e6), ("nm", 1e9))
 METRES = LENGTHS[:1]
+#: A heading with units in brackets shows this one as nothing or [-].
 NUMBER: Units = (("", 1.0),)
 STRESSES: Units = (("MPa", 1e-6), ("kPa", 1e-3), ("Pa", 1))
 FORCES: Units = (("MN/m", 1e-6), ("kN/m", 1e-3), ("N/m", 1))

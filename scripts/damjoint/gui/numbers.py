@@ -19,9 +19,8 @@ from ..statics.notes import remarks
 from ..statics.statement import path_statement
 from ..studies.quake_result import QuakeResult
 from ..studies.quake_summary import row_of_peak
-from ..units import FORCES, LENGTHS, Units, unit, with_unit
+from ..units import FORCES, LENGTHS, NUMBER, Units, unit, with_unit
 
-NUMBER: Units = (("-", 1),)
 #: Safety factors: column, heading, meaning.
 FACTORS = (
     (
@@ -98,7 +97,7 @@ class Numbers:
             size, factor = unit([finite], units) if finite.any() else units[0]
             values = BESIDE.join(three_digits(value * factor) for value in both)
             if both and not (name in OPTIONAL and not any(both)):
-                rows.append((f"{head} [{size}]".removesuffix(" [-]"), values, meaning))
+                rows.append((f"{head} [{size}]" if size else head, values, meaning))
         where = "part of the joint where its normal force acts"
         return [*rows, ("N' in", BESIDE.join(self.positions), where)]
 

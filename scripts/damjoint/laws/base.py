@@ -228,6 +228,12 @@ class SofteningLaw(Law[V]):
     grows.
     """
 
+    @classmethod
+    def least_energies(cls, parameters: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
+        """See `Law`."""
+        strength, stiffness = parameters["sigma_max"], parameters["K_N"]
+        return {"G_f": (strength * strength / (2 * stiffness), "sigma_max^2/(2 K_N)")}
+
     def frozen_damage(self, jump: Array, variables: V) -> Array:
         """What is frozen of each point at a jump (q,): its damage, or its share of stiffness."""
         raise NotImplementedError

@@ -66,10 +66,8 @@ class Bond(SofteningLaw[BondVariables]):
         """See `Law`."""
         p, steepest = parameters, CURVES[parameters["softening"]].steepest
         shear = p["adhesion"] * p["adhesion"] / (2 * p["K_T"]) * steepest
-        return {
-            "G_f": (p["sigma_max"] * p["sigma_max"] / (2 * p["K_N"]), "sigma_max^2/(2 K_N)"),
-            "G_t": (shear, "adhesion^2/(2 K_T)" if steepest == 1 else "adhesion^2/K_T"),
-        }
+        formula = "adhesion^2/(2 K_T)" if steepest == 1 else "adhesion^2/K_T"
+        return {**super().least_energies(parameters), "G_t": (shear, formula)}
 
     # -- internal variables
 

@@ -43,12 +43,6 @@ class Mixed(SofteningLaw[MixedVariables]):
         #: where linear softening ends; without strength there is none
         self.L_C = 2 * p["G_f"] / self.tensile_strength if self.tensile_strength else 0.0
 
-    @classmethod
-    def least_energies(cls, parameters: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
-        """See `Law`."""
-        strength, stiffness = parameters["sigma_max"], parameters["K_N"]
-        return {"G_f": (strength * strength / (2 * stiffness), "sigma_max^2/(2 K_N)")}
-
     # -- internal variable
 
     def initial(self, points: int) -> MixedVariables:

@@ -66,12 +66,6 @@ class Rupture(SofteningLaw[RuptureVariables]):
         self.grout, self.grout_t = p["grout_pressure"] / self.K_contact, p["grout_t"]
         self.saw, self.saw_t = p["saw_thickness"], p["saw_t"]
 
-    @classmethod
-    def least_energies(cls, parameters: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
-        """See `Law`."""
-        strength, stiffness = parameters["sigma_max"], parameters["K_N"]
-        return {"G_f": (strength * strength / (2 * stiffness), "sigma_max^2/(2 K_N)")}
-
     # -- internal variables
 
     def initial(self, points: int) -> RuptureVariables:

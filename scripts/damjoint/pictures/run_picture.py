@@ -81,8 +81,10 @@ COLORS = BLUE, ORANGE, GREEN, VIOLET, RED, DARK
 BOTH_SIGNS = 0.02
 #: Limits of an axis in percent: lines at 0 and 100 are visible.
 PERCENT = (-3, 103)
-#: Percentiles between which a map has a scale; its last colors are those of all values beyond.
-SCALED, CLIPPED = (2, 98), 0.25
+#: Percentiles [%]: values outside them get the colors at the ends of a map's scale, but ...
+SCALED = 2, 98
+#: ... where the extreme is nearer to its percentile than this part of the range between both [-].
+CLIPPED = 0.25
 #: Ground shown around the dam in the view, over the dam's size.
 AROUND = 0.3
 #: Intervals of the scale of a map, about; its least range.

@@ -39,9 +39,9 @@ class Mechanism:
     """How the dam fails, as its equilibrium path has shown."""
 
     mode: str
-    #: its displacement over that at its highest level
+    #: displacement at the end of the path over that at its limit point [-]
     displacement_ratio: float
-    #: whose loads acted
+    #: time whose loads act
     time: float
     #: the highest level [m]
     level: float = np.nan

@@ -32,8 +32,7 @@ def hints(results: Results) -> list[str]:
         of_joints += (f"{name}: {hint}" if name else hint for hint in hints_on_joint(joint_result))
     if case.published:
         return of_joints
-    # limit points of the same digits are passed twice where a step reaches just above the first
-    return list(dict.fromkeys(of_joints + hints_on_run(results)))
+    return of_joints + hints_on_run(results)
 
 
 def hints_on_joint(results: Results) -> list[str]:
@@ -103,10 +102,12 @@ def hints_on_run(results: Results) -> list[str]:
             f"from level {begin:.5g} to {end:.5g} m a joint breaks at once, and no shorter steps "
             "lead there: what is left of its strength may depend on the steps"
         )
-    for limit, lowest in results.info.get("limit_points", ()):
+    # of the same digits where a step reaches just above the first one, so that it is passed twice
+    digits = (tuple(f"{h:.4g}" for h in both) for both in results.info.get("limit_points", ()))
+    for limit, lowest in dict.fromkeys(digits):
         messages.append(
-            f"unstable crack growth at level {limit:.4g} m: along the equilibrium path the level "
-            f"falls to {lowest:.4g} m before it rises again"
+            f"unstable crack growth at level {limit} m: along the equilibrium path the level falls "
+            f"to {lowest} m before it rises again"
         )
     if results.info.get("engine") == "getdp" and verdict(results) == "not converged":
         messages.append(

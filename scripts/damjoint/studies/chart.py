@@ -20,7 +20,7 @@ from ..input.case import Case
 from ..pictures.drawing import BLUE, ORANGE, RED, picture_style, widen, write_picture
 from ..pictures.drawing import figure_of as drawing_of
 from ..statics.gravity import sliding_factor
-from ..units import LENGTHS, Units, unit
+from ..units import LENGTHS, NUMBER, Units, unit
 from .plan import Plan, Row, column_of, numbers, quantity_of
 from .report_input import suitable_unit
 from .sweep import UNDECIDED
@@ -175,7 +175,7 @@ def panels_of(figure: Figure, table: Table) -> Iterator[tuple[Axes, str, tuple[s
         words, size = quantity_of(plan.critical)
         drawn = {plan.critical_columns[0]: (f"critical {words}", ((size, 1),))}
     elif not plan.quake:
-        drawn[FACTOR] = FACTOR_LABEL, (("-", 1),)
+        drawn[FACTOR] = FACTOR_LABEL, NUMBER
     shape = (2, 2) if len(drawn) > 1 else (1, 1)
     panels = figure.subplots(*shape, squeeze=False).ravel()
     for unused in panels[len(drawn) :]:
@@ -220,7 +220,7 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
             panel.set_xlim(-0.5, len(categories) - 0.5)
         else:
             scale_axis(panel.xaxis, x)
-        panel.set(xlabel=x_label, ylabel=f"{words} [{size}]")
+        panel.set(xlabel=x_label, ylabel=f"{words} [{size or '-'}]")
         panel.grid(alpha=0.3)
         if drawn == FACTOR:
             draw_verdicts(panel, table, x, values)
@@ -304,7 +304,7 @@ def draw_maps(figure: Figure, table: Table, names: list[str]) -> None:
             words = "zero in all rows that stand" if bad.any() else "zero in all rows"
             panel.text(0.5, 0.5, words, ha="center", transform=panel.transAxes)
         panel.plot(i[bad] + 0.5, j[bad] + 0.5, "x", color=RED, markersize=4)
-        bar = figure.colorbar(colors, ax=panel, label=f"{quantity_drawn} [{size}]")
+        bar = figure.colorbar(colors, ax=panel, label=f"{quantity_drawn} [{size or '-'}]")
         if not np.nan_to_num(values).any():
             bar.set_ticks([0])
         for axis, ends, name in ((panel.xaxis, across, names[0]), (panel.yaxis, up, names[1])):

@@ -443,6 +443,8 @@ def verdict_line(check: SafetyCheck) -> str:
 
 
 def worst_verdict(*checks: SafetyCheck) -> str:
-    """The worst verdict of both methods on joints."""
+    """The worst verdict of both methods on joints; joints of which nothing is required do not count
+    beside others.
+    """
     verdicts = [result.verdict for check in checks for result in check.results]
-    return min(verdicts, key=(FAIL, NOT_JUDGED, UNCHECKED, PASS).index)
+    return min(verdicts, key=(FAIL, NOT_JUDGED, PASS, UNCHECKED).index)

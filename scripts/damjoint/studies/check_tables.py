@@ -11,7 +11,7 @@ import numpy as np
 
 from ..pictures.check_picture import SIGN
 from ..post.summary import aligned, fitted
-from ..units import FORCES, METRES, MOMENTS, STRESSES, Units, unit
+from ..units import FORCES, METRES, MOMENTS, NUMBER, STRESSES, Units, unit
 from .check import (
     DIFFERENCE,
     FAIL,
@@ -39,7 +39,7 @@ SHOWN: tuple[tuple[Units, dict[str, str]], ...] = (
     (STRESSES, {"sigma_n_eff_heel": "eff. heel", "sigma_n_eff_toe": "eff. toe"}),
     (METRES, {"crack_length": "crack"}),
     (FORCES, {"cohesion": "c B", "cohesion_undamaged": "c L"}),
-    ((("-", 1),), {"SSF": "SSF", "OSF": "OSF"}),
+    (NUMBER, {"SSF": "SSF", "OSF": "OSF"}),
 )
 
 
@@ -65,7 +65,7 @@ def text_table(checks: list[SafetyCheck], width: int | None = None) -> str:
         values[is_difference & (np.abs(values) < least)] = 0
         sign = f"\n{SIGN}" if units is STRESSES else ""
         names += shown.values()
-        heads += [f"{title}\n[{size}]{sign}" for title in shown.values()]
+        heads += [f"{title}\n[{size or '-'}]{sign}" for title in shown.values()]
         columns += [list(map(cell, line * factor, is_difference)) for line in values]
     verdicts = ([row[name] for row in rows] for name in ("position", "verdict"))
     scenes = [scene_label(checks, row) for row in rows]
@@ -151,7 +151,7 @@ def picture_table(check: SafetyCheck) -> list[tuple[str, ...]]:
         size, factor = unit([np.array(values)[np.isfinite(values)]], units)
         for (name, title), line in zip(names.items(), values, strict=True):
             numbers = (cell(v * factor) for v in line)
-            head = title if size == "-" else f"{title} [{size}]"
+            head = f"{title} [{size}]" if size else title
             cells.append((head, *numbers, cell(least.get(name, math.nan))))
     if where := position_by_case(check.case):
         cells.append(("N' in", *(result.position for result in check.results), where))

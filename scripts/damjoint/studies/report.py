@@ -36,6 +36,7 @@ from ..storage import atomic_write
 from ..units import FORCES, METRES, MOMENTS, NUMBER, Units, unit, unit_of_time
 from . import body_stress, report_input, report_quake, report_studies
 from .check import (
+    FAIL,
     NOT_JUDGED,
     REQUIRED,
     UNCHECKED,
@@ -46,6 +47,7 @@ from .check import (
     hand_calculation,
     required_by_case,
     requirements,
+    worst_verdict,
 )
 from .check_tables import SHOWN
 from .report_input import Entry, by_runs, in_table
@@ -321,7 +323,8 @@ def run_section(folder: Path, number: int, solution: Solution) -> RunSection:
     judged = not (critical or "quake" in info)
     failures, verdict = [], UNCHECKED
     if judged:
-        failures, verdict = failures_of(result, checks), worst_verdict(result, checks)
+        failures = failures_of(result, checks)
+        verdict = FAIL if info["state"] in UNFINISHED else worst_verdict(*checks)
     elif required := requirements(case):
         state = "before failure" if critical else "after the earthquake"
         verdict = NOT_JUDGED
@@ -476,14 +479,6 @@ def failures_of(result: Results, checks: list[SafetyCheck]) -> list[str]:
     return [*messages, *(f"{name}: {why}" for name, why in reasons)]
 
 
-def worst_verdict(result: Results, checks: list[SafetyCheck]) -> str:
-    """The worst verdict on a joint by a method; fail for a run that has not ended by itself."""
-    verdicts = {r.verdict for check in checks for r in check.results}
-    if result.info["state"] in UNFINISHED:
-        return "fail"
-    return next(v for v in ("fail", NOT_JUDGED, "pass", UNCHECKED) if v in verdicts)
-
-
 def notes_of(checks: list[SafetyCheck]) -> list[str]:
     """Notes on the methods: those of all joints once, others with the name of their joint."""
     lines = (
@@ -541,9 +536,7 @@ def methods_table(case: Case, checks: list[SafetyCheck], judged: bool) -> Table:
     ]
     words, end = ["joint", "method"][first:], [""] * verdicts
     without = [""] * len(words)
-    return Table(
-        [*words, *names, *end], [*without, *(size.strip("-") for size in sizes), *end], table
-    )
+    return Table([*words, *names, *end], [*without, *sizes, *end], table)
 
 
 def in_one_unit(heads: Iterable[str], values: np.ndarray, units: Units) -> Iterator[Column]:
