@@ -25,9 +25,14 @@ SAME_STATE = 1e-6
 SAME_LEVEL = 1e-4
 #: Relative reserve of the bound within which a level is at it: the precision of the search.
 AT_THE_BOUND = 2e-3
-#: Level from which all searches rise, over the dam's height; over the first critical level that is
-#: found those of the second and third start, and of the states below and above it.
-FIRST_START, STARTS, BELOW, ABOVE = 0.3, (0.6, 0.9), 0.995, 1.005
+#: Level from which all searches rise, over the dam's height [-].
+FIRST_START = 0.3
+#: Levels of the second and third start, over the first critical level [-].
+STARTS = 0.6, 0.9
+#: Level of the state below it, over the first critical level [-].
+BELOW = 0.995
+#: Level of the state above it, over the first critical level [-].
+ABOVE = 1.005
 
 
 #: The failure that ends a branch only: there may be an equilibrium above it.

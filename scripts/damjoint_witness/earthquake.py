@@ -27,9 +27,12 @@ from .tables import DIGITS, rows_of_nodes, updates_of
 MOMENTUM_TOLERANCE = 1e-6
 #: Tolerance of motions relative to their largest value: twelve digits, summed over the steps.
 MOTION_TOLERANCE = 1e-6
-#: A dam at rest stays within this share of its largest slip, or this slip over its height; a joint
-#: without friction is broken beyond this share of its length.
-AT_REST, LEAST_MOTION, BROKEN = 0.01, 2.2e-7, 0.99
+#: A dam at rest stays within this share of its largest slip [-], or ...
+AT_REST = 0.01
+#: ... within this slip over its height [-].
+LEAST_MOTION = 2.2e-7
+#: A joint without friction is broken beyond this share of its length [-].
+BROKEN = 0.99
 #: Value of damping_mass: of the concrete, not of the water that moves with it.
 OF_CONCRETE = 1
 #: Standard gravity [m/s2], of records in g.

@@ -15,9 +15,11 @@ from .laws.point import Values
 
 #: Tolerance of stresses, relative to the strength; of damage.
 TOLERANCE = 1e-6
-#: Rounding of a stress, relative to the stiffness times the jump and to the stress itself; a stress
-#: that is none, over the weight of a column of the dam, rho g H: 1e-9 Pa under 45 m of concrete.
-ROUNDING, NOTHING = 1e-11, 1e-15
+#: Rounding of a stress over the stiffness times the jump, and over the stress itself [-].
+ROUNDING = 1e-11
+#: A stress that is none over the weight of a column of the dam, rho g H [-]: 1e-9 Pa under 45 m of
+#: concrete.
+NOTHING = 1e-15
 
 
 def laws(steps: Table, joints: Sequence[Values]) -> Iterator[str]:

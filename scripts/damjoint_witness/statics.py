@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from .files import Files
 from .reader import Asked, Point, Section, Values
 
-#: Tolerance of forces and moments, relative to the dam's weight (times the joint's length), with
-#: that of the residual of the step.
-TOLERANCE, OF_RESIDUAL = 1e-7, 10.0
+#: Tolerance of forces and moments over the dam's weight (times the joint's length) [-].
+TOLERANCE = 1e-7
+#: The same over the residual of the step [-], which is added.
+OF_RESIDUAL = 10.0
 #: Zangar's largest pressure coefficient, by the face's angle from the vertical [degrees].
 ZANGAR = {0: 0.735, 10: 0.67, 20: 0.62, 30: 0.55, 40: 0.48, 50: 0.4, 60: 0.31, 70: 0.225, 80: 0.125}
 #: Values of added_mass.

@@ -23,9 +23,12 @@ from .files import Files, Table, rows_where
 from .reader import Asked, Section, Values
 from .statics import along_joint, loads
 
-#: Least safety of a rigid block whose equilibrium counts as certain, and the least distance of its
-#: resultant from the ends of the joint in elements, and relative to its length.
-CERTAIN_SAFETY, ELEMENTS_INSIDE, SHARE_INSIDE = 1.05, 3, 0.05
+#: Least safety of a rigid block whose equilibrium counts as certain [-].
+CERTAIN_SAFETY = 1.05
+#: Least distance of its resultant from the ends of the joint [elements].
+ELEMENTS_INSIDE = 3
+#: The same over the length of the joint [-].
+SHARE_INSIDE = 0.05
 #: Largest load factor that is looked for.
 MOST = 10.0
 #: Damage at the peak of law = endo.

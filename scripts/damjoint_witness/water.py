@@ -36,13 +36,18 @@ SAME_PLACE = 1e-7
 NO_EFFECT = 1e-9
 #: Times that differ by less are the same.
 SAME_TIME = 1e-9
-#: Aperture of the closed joint [m] with uplift = cracked, and the largest growth over it.
-CRACK_APERTURE, CRACK_MOST = 1 / 4.5e9, 100.0
+#: Aperture of the closed joint with uplift = cracked [m].
+CRACK_APERTURE = 1 / 4.5e9
+#: Its largest growth over it [-].
+CRACK_MOST = 100.0
 #: Digits of the elimination in a network: conductances of open and closed joints differ by 1e18.
 PRECISION = 60
-#: Reynolds number from which flow between smooth plates is turbulent, and the change of the drops
-#: of the head over the largest one up to which it is settled; in 3D, of a system of equations.
-TURBULENT, SETTLED, SETTLED_IN_3D = (96 / 0.316) ** (4 / 3), 1e-12, 1e-10
+#: Reynolds number from which flow between smooth plates is turbulent [-].
+TURBULENT = (96 / 0.316) ** (4 / 3)
+#: Change of the drops of the head over the largest one up to which it is settled [-].
+SETTLED = 1e-12
+#: The same in 3D, where it is that of a system of equations [-].
+SETTLED_IN_3D = 1e-10
 #: Modes whose water flows, and those that water does not pass.
 FLOWING, CLOSED = ("flow", "cracked"), ("none", "waterstop")
 

@@ -16,9 +16,8 @@ S is symmetric; the motions of the bodies that the joints alone hold are its nul
 single joint, v is the displacement of its lower face, K = S_u + S_l and C = S_u. That is how 2D is
 computed; glued_elimination.py computes the same S and t_0 in 3D.
 
-GetDP is not used for the
-bodies: its start alone takes as long as all steps of a 2D scene, and an independent assembly checks
-the problem definition (tests compare both).
+GetDP is not used for the bodies: its start alone takes as long as all steps of a 2D scene, and an
+independent assembly checks the problem definition (tests compare both).
 """
 
 from __future__ import annotations

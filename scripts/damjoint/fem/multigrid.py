@@ -31,12 +31,16 @@ COARSEST = 600
 #: Size of the block that couples two nodes over those of both on the diagonal from which on the
 #: coupling is strong: only along strong ones are aggregates formed, across thin elements.
 STRONG = 0.02
-#: Degree of Chebyshev's polynomial, and largest over smallest eigenvalue that it damps.
-DEGREE, DAMPED = 2, 10.0
+#: Degree of Chebyshev's polynomial.
+DEGREE = 2
+#: Largest over smallest eigenvalue that it damps [-].
+DAMPED = 10.0
 #: Part of the largest singular value below which rigid motions of an aggregate are dependent.
 DEPENDENT = 1e-6
-#: Iterations of the power method, and what its estimate of the largest eigenvalue is raised by.
-POWER_ITERATIONS, RAISED = 12, 1.1
+#: Iterations of the power method.
+POWER_ITERATIONS = 12
+#: Factor by which its estimate of the largest eigenvalue is raised [-]: it is too small.
+RAISED = 1.1
 
 
 @dataclass(frozen=True)

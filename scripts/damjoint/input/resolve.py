@@ -67,14 +67,7 @@ def resolve(source: Source) -> Case:
         steps = steps or (1 if plain["drive"] == "level" else None)
     if steps is not None:
         check_steps(steps)
-    lists, tails = loading_lists(source, steps)
-    of_flood: dict[str, Any] = {}
-    if "hydrograph" in file.texts:
-        if source.levels is not None or "levels" in file.lists:
-            raise InputError("levels: must not be set with a hydrograph, which has them")
-        flood = hydrograph.read(Path(file.texts["hydrograph"]))
-        of_flood, lists["levels"] = flood.settings, flood.levels
-        tails = flood.tail_levels or tails
+    lists, tails, of_flood = loading_lists(source, steps)
     overrides = {name: checked(name, value) for name, value in overrides.items()}
     for name in GEOMETRY_LISTS:
         if name in overrides:
@@ -122,9 +115,9 @@ def resolve(source: Source) -> Case:
 
 def loading_lists(
     source: Source, steps: int | None
-) -> tuple[dict[str, tuple[float, ...]], tuple[float, ...]]:
-    """The lists of a case file, with the levels of the source; its tailwater levels; steps: between
-    two levels, in place of the file's times.
+) -> tuple[dict[str, tuple[float, ...]], tuple[float, ...], dict[str, Any]]:
+    """The lists of a case file, with the levels of the source or of a hydrograph; the tailwater
+    levels; the hydrograph's settings; steps: between two levels, in place of the file's times.
 
     Raises InputError.
     """
@@ -136,7 +129,12 @@ def loading_lists(
     tails = lists.pop("tail_levels", (0.0,))
     if source.tail_levels is not None:
         tails = levels_of("tail_levels", source.tail_levels)
-    return lists, tails
+    if "hydrograph" not in source.text.texts:
+        return lists, tails, {}
+    if "levels" in lists:
+        raise InputError("levels: must not be set with a hydrograph, which has them")
+    flood = hydrograph.read(Path(source.text.texts["hydrograph"]))
+    return lists | {"levels": flood.levels}, flood.tail_levels or tails, flood.settings
 
 
 def check_geometry(geometry: Path, face: Sequence[float], accuracy: str | None) -> None:

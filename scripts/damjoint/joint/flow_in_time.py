@@ -27,9 +27,11 @@ from ..threads import scipy_linalg
 from .flow import Flow, FlowSolution, FlowSystem
 
 #: Sets of nodes with voids at most; usually fewer than ten, and a front of water takes one for each
-#: node. After so many what nodes with voids do not give is that of the last set: else a node may
-#: have voids as long as it counts as full, and none as long as it does not.
-MOST_SETS, FREE_SETS = 2000, 50
+#: node.
+MOST_SETS = 2000
+#: Sets after which what nodes with voids do not give is that of the last set: else a node may have
+#: voids as long as it counts as full, and none as long as it does not.
+FREE_SETS = 50
 #: Pressure below p_c over the largest one, and a void below zero over what the node stores and what
 #: the largest head would let flow there, up to which they count as rounding [-].
 ROUNDING = 1e-12

@@ -54,12 +54,15 @@ from .state import State, Trace
 DIFFERENCE = 3e-6
 ZERO = {"Pa": 1.0, "Pa per m": 1e5, "N per m": 1e-1, "kg per m3": 1e-2}
 
-#: Corrections of a derivative, and the last one over the derivative beyond which a point of the
-#: joint is at a kink: about to open, to slip or to break [-].
-CORRECTIONS, KINK = 6, 1e-5
-#: Correction over the derivative up to which there is no further one; beyond which the last one
-#: has found no derivative [-].
-EXACT, LOST = 1e-7, 1e-3
+#: Corrections of a derivative at most.
+CORRECTIONS = 6
+#: Correction over the derivative up to which there is no further one [-].
+EXACT = 1e-7
+#: Last correction over the derivative beyond which a point of the joint is at a kink [-]: about to
+#: open, to slip or to break.
+KINK = 1e-5
+#: Last correction over the derivative beyond which there is no derivative [-].
+LOST = 1e-3
 #: Correction times the distance of the sides, over the jumps, up to which it is round-off [-].
 ROUNDING = 1e-13
 

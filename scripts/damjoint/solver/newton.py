@@ -32,7 +32,7 @@ class Strategy:
     release: int
     iterations: int
     halvings: int
-    #: number of iterations after the smallest residual, after which the solution is given up
+    #: number of iterations without a smaller residual after which the solution ends
     patience: float = np.inf
 
 
@@ -104,10 +104,11 @@ STAGNATING_ITERATIONS = 4
 #: has come back to one of them: above the rounding of a norm, far below any progress.
 SAME = 1e-10
 
-#: Numbers of iterations of the cycles into which Newton's method may run, and the relative
-#: difference of the residuals of one cycle and the next below which it stays there [-]: of 6000
-#: solutions of random scenes that converged, two had come so near to a cycle before.
-CYCLES, CYCLE = range(2, 7), 1e-3
+#: Numbers of iterations of the cycles into which Newton's method may run.
+CYCLES = range(2, 7)
+#: Relative difference of the residuals of one cycle and the next below which it stays there [-]: of
+#: 6000 solutions of random scenes that converged, two had come so near to a cycle before.
+CYCLE = 1e-3
 
 #: x rounded to 43 of its 53 bits is x (2^10 + 1) - (x (2^10 + 1) - x): Veltkamp's splitting.
 SPLITTER = 2.0**10
@@ -177,8 +178,8 @@ def end_of(now: Iterate, sizes: list[float], strategy: Strategy) -> str:
 
 
 def cycles(sizes: list[float]) -> bool:
-    """Whether the last residuals are those of a cycle before them, see CYCLES; some of a cycle
-    differ, else they stagnate.
+    """Whether the last residuals repeat those of a cycle before them, see CYCLES. Residuals that
+    are all the same stagnate, see `end_of`.
     """
     return any(
         len(sizes) >= 2 * n

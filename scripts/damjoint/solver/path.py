@@ -51,8 +51,10 @@ PRECISION = 1e-4
 FIRST = 0.05
 #: Relative rise of the level that an increment aims at [-]; fewer equilibria above, more below.
 RISE = 0.02
-#: Bounds of an increment over the one before [-].
-SHRINKING, GROWTH = 0.25, 2.0
+#: Least increment over the one before [-].
+SHRINKING = 0.25
+#: Largest increment over the one before [-].
+GROWTH = 2.0
 
 # An increment is halved until its two halves lead to the same state
 

@@ -43,7 +43,7 @@ class State:
     stored: tuple[StoredWater, ...] = ()
     #: the joints before the earthquake that acts, if the water follows from them
     before_quake: BeforeQuake | None = None
-    #: the state before, without its own
+    #: the state before this one; of that the one before is not kept
     previous: State | None = None
     #: the updates that led to it, of a case with `all_steps`
     trace: Trace | None = None

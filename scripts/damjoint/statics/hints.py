@@ -63,9 +63,7 @@ def turbulence(case: Case, rows: Table) -> str:
         return ""
     steady = 2 * np.abs(rows.get("flux", 0.0)) / case["visc"]
     number = float(np.max(rows.get("Re", steady)))
-    if number <= TURBULENT:
-        return ""
-    if case["turbulent"]:
+    if number <= TURBULENT or case["turbulent"]:
         return ""
     return (
         f"the Reynolds number of the flow reaches {number:.3g}: beyond {TURBULENT} it is "
@@ -74,9 +72,22 @@ def turbulence(case: Case, rows: Table) -> str:
 
 
 def hints_on_run(results: Results) -> list[str]:
-    """Hints on the model as a whole, and on the last state of each joint."""
-    case, last, messages = results.case, results.last, list[str]()
-    reach = min(case["found_side"], case["found_depth"])
+    """Hints on the model as a whole, on the path, and on the last state of each joint."""
+    messages = [*hints_on_model(results.case), *hints_on_path(results), *hints_on_time(results)]
+    growth, stopped = results.info.get("unstable_growth"), verdict(results) == "not converged"
+    for k, joint_result in enumerate(results.joints if results.last else []):
+        name, last = results.case.named((k,)), joint_result.last
+        share = tension_share(joint_result.case, last)
+        evidence = Evidence(last["crack_length"], bool(growth) or stopped, share)
+        of_joint = [*joint_result.case.law.hints(evidence), *hints_on_state(joint_result, last)]
+        of_joint += filter(None, [turbulence(joint_result.case, joint_result.history)])
+        messages += (f"{name}: {hint}" if name else hint for hint in of_joint)
+    return messages
+
+
+def hints_on_model(case: Case) -> list[str]:
+    """Hints on the dimension and on the size of the foundation."""
+    messages, reach = list[str](), min(case["found_side"], case["found_depth"])
     if case["dim"] == 3 and case["hold_z"] and not case.geometry:
         messages.append(
             "an extruded section with hold_z = 1 is in plane strain: dim = 2 has the same "
@@ -87,7 +98,13 @@ def hints_on_run(results: Results) -> list[str]:
             f"the foundation reaches {reach:g} m: less than {LEAST_FOUNDATION:g} heights of the "
             "dam make the crack too long"
         )
-    if results.info.get("weight_with_water") and last:
+    return messages
+
+
+def hints_on_path(results: Results) -> list[str]:
+    """Hints on what depends on the load steps, or on the engine."""
+    messages = list[str]()
+    if results.info.get("weight_with_water") and results.last:
         messages.append(
             "the weight alone has not converged: it acts with the first level, and the state may "
             "depend on the load steps"
@@ -114,6 +131,12 @@ def hints_on_run(results: Results) -> list[str]:
             "the engine getdp does not follow the equilibrium path beyond a limit point: "
             "--engine condensed does"
         )
+    return messages
+
+
+def hints_on_time(results: Results) -> list[str]:
+    """Hints on steps of water that flows in time."""
+    case, messages = results.case, list[str]()
     timed = [joint for joint in case.joints if flows_in_time(joint)]
     if timed and case["storage"] == 0 and verdict(results) == "not converged":
         width = max(joint["aperture_min"] for joint in timed)
@@ -129,14 +152,6 @@ def hints_on_run(results: Results) -> list[str]:
             "more than the levels: a step of this length may have several equilibria, and the "
             f"state then depends on the steps; pressure_step = {LARGE_MOVE * highest:.2g} halves it"
         )
-    unstable = bool(levels) or verdict(results) == "not converged"
-    for k, joint_result in enumerate(results.joints if last else []):
-        name, last = case.named((k,)), joint_result.last
-        share = tension_share(joint_result.case, last)
-        evidence = Evidence(last["crack_length"], unstable, share)
-        of_joint = [*joint_result.case.law.hints(evidence), *hints_on_state(joint_result, last)]
-        of_joint += filter(None, [turbulence(joint_result.case, joint_result.history)])
-        messages += (f"{name}: {hint}" if name else hint for hint in of_joint)
     return messages
 
 

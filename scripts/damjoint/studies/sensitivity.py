@@ -59,9 +59,11 @@ PRINTED = (
 #: Part of the largest change of a result below which another one is round-off.
 ROUNDING = 1e-9
 
-#: Difference of derivatives to one and to both sides, over them, beyond which there is a kink [-],
-#: and that of results by a relative change of one, over them, up to which it is round-off [-].
-ONE_SIDED, NOISE = 1e-3, 1e-5
+#: Difference of derivatives to one and to both sides, over them, beyond which there is a kink [-].
+ONE_SIDED = 1e-3
+#: Change of results by a relative change of a parameter by one, over them, up to which it is
+#: round-off [-].
+NOISE = 1e-5
 
 #: Rise of the level with the displacement, over its mean on the path [-], up to which a point
 #: counts as a limit point, whose level has a derivative: 5e-6 where a dam slides; 5e-4 gives 2 % of
