@@ -28,6 +28,15 @@ def add(command: Parser) -> None:
     command.add_accuracy()
     command.add_wide()
     command.add_case()
+    add_values(command)
+    add_kind(command)
+    command.add_jobs()
+    command.add_scheduler()
+    command.add_path("--out", "FILE", help=f"{RESUMED} (default: CASE_sweep.csv)")
+
+
+def add_values(command: Parser) -> None:
+    """Add the options for the values of the rows."""
     command.add_list(
         "--vary",
         "NAME=VALUES",
@@ -62,6 +71,10 @@ def add(command: Parser) -> None:
         "A,B=R",
         help="rank correlation -1 < R < 1 of two sampled parameters (repeatable; default: 0)",
     )
+
+
+def add_kind(command: Parser) -> None:
+    """Add the options for what a row is: a run by default, a critical value or an earthquake."""
     command.add_argument(
         "--critical",
         nargs="?",
@@ -98,9 +111,6 @@ def add(command: Parser) -> None:
         "the ground, Arias' intensity, spectral acceleration at the dam's first period (default: "
         "peak_ground_ax)",
     )
-    command.add_jobs()
-    command.add_scheduler()
-    command.add_path("--out", "FILE", help=f"{RESUMED} (default: CASE_sweep.csv)")
 
 
 def call(arguments: argparse.Namespace) -> int:

@@ -267,6 +267,22 @@ def uplift_in_earthquake(case: Case) -> str:
 
 def limits(case: Case, earthquake: bool = False) -> Iterator[str]:
     """What the model of a case includes and what not, in sentences; earthquake: after statics."""
+    yield from limits_of_model(case)
+    yield from limits_of_loads(case, earthquake)
+    yield (
+        "Loads follow each other as listed; the result depends on their order, and internal "
+        "variables of the joint are updated once per load step."
+    )
+    if not case.geometry:
+        yield (
+            "The gravity method treats the dam as a rigid block, with stress linear along the "
+            "joint, which cracks from the heel only. The finite elements' stresses at heel and "
+            "toe are those of corners and depend on the mesh."
+        )
+
+
+def limits_of_model(case: Case) -> Iterator[str]:
+    """Those of geometry, bodies and joints."""
     yield "Displacements and strains are small: equilibrium is that of the undeformed geometry."
     if any("path" in joint.section for joint in case.joints):
         yield (
@@ -299,6 +315,10 @@ def limits(case: Case, earthquake: bool = False) -> Iterator[str]:
     for sentence, numbers in of_joints.items():
         some = len(numbers) < len(case.joints)
         yield sentence[:-1] + (f" ({case.named(numbers)})." if some else ".")
+
+
+def limits_of_loads(case: Case, earthquake: bool) -> Iterator[str]:
+    """Those of the loads, and what is not modelled; earthquake: after statics."""
     if case["face_load"] == "uniform":
         yield "The water pressure on the faces is uniform, not hydrostatic."
     if not case["floor_water"]:
@@ -326,13 +346,3 @@ def limits(case: Case, earthquake: bool = False) -> Iterator[str]:
     yield f"Not modelled: {never}."
     if absent:
         yield f"Loads that are zero: {', '.join(absent)}."
-    yield (
-        "Loads follow each other as listed; the result depends on their order, and internal "
-        "variables of the joint are updated once per load step."
-    )
-    if not case.geometry:
-        yield (
-            "The gravity method treats the dam as a rigid block, with stress linear along the "
-            "joint, which cracks from the heel only. The finite elements' stresses at heel and "
-            "toe are those of corners and depend on the mesh."
-        )
