@@ -211,11 +211,11 @@ def measured(
     """A displacement of body c, weights of its degrees of freedom (n,): on those away from the
     joints row (forces - coupling^T u_c); u_c = R_c v + J_c d with v = K^-1 (sum R_b^T f_b - C d).
     """
-    above, own_dofs = reduced[bearer], joints.gluing.bodies[bearer]
+    above, bearer_dofs = reduced[bearer], joints.gluing.bodies[bearer]
     size = len(above.loaded_stiffness)
     row = solve_positive(above.loaded_stiffness, weights[above.dofs[:size]])
-    on_face = weights[own_dofs.dofs] - above.coupling @ row
-    both = solve_positive(joints.glued, joints.on_nodes(own_dofs, on_face))
+    on_face = weights[bearer_dofs.dofs] - above.coupling @ row
+    both = solve_positive(joints.glued, joints.on_nodes(bearer_dofs, on_face))
     pressure: list[Array] = []
     units: dict[str, float] = {}
     for name, body in bodies.by_name.items():
@@ -226,7 +226,7 @@ def measured(
         for i, load in enumerate(body.unit_loads):
             units[load] = units.get(load, 0) + float(moved[i])
     return Measure(
-        jump=own_dofs.on_jumps(on_face) - joints.coupling @ both,
+        jump=bearer_dofs.on_jumps(on_face) - joints.coupling @ both,
         units=units,
         pressure=np.concatenate(pressure),
     )

@@ -60,7 +60,7 @@ class Camera:
         wider = max(WIDTH * (top - bottom) - (right - left), 0.0) / 2
         return np.array([(left - wider, low), (right + wider, low + BAND * height)])
 
-    def place(self, right_up: np.ndarray) -> np.ndarray:
+    def points_at(self, right_up: np.ndarray) -> np.ndarray:
         """Points of the scene (n, 3) at places to the right and upwards (n, 2) [m]."""
         middle = np.full(len(right_up), self.seen[:, 2].mean())
         points: np.ndarray = np.column_stack([right_up, middle]) @ self.rotation

@@ -46,8 +46,8 @@ def show_graphs(graphs: Graphs, scene: SolvedScene, before: Sequence[SolvedScene
             graphs.add(*graph, now=scene.times.clip(rows["time"][0]))
     elif len(scene.result.history["time"]):
         levels = graphs_of_history(scene, before)
-    places = marks_of_steps(scene) if levels else []
-    marked = list(zip(levels, places, strict=True))
+    positions = marks_of_steps(scene) if levels else []
+    marked = list(zip(levels, positions, strict=True))
     unmarked = [(graph, UNMARKED) for graph in joint]
     for graph, (now, level) in (*unmarked[:2], *marked[:1], *unmarked[2:], *marked[1:]):
         graphs.add(*graph, now=now, level=level)

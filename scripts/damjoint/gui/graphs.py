@@ -134,8 +134,8 @@ class Graphs:
             pieces = pieces_of(at_x, lines, x_range)
             self.line(name, (x, y), pieces, curve.color, curve.points, width=2)
             if curve in named and len(named) > 1:
-                place = x + self.layout.graph_size[0], y - 15 + 13 * named.index(curve)
-                self.names.append((curve.name, *place, curve.color))
+                position = x + self.layout.graph_size[0], y - 15 + 13 * named.index(curve)
+                self.names.append((curve.name, *position, curve.color))
 
     def write_names(self) -> None:
         """Write the names of all curves."""
@@ -149,13 +149,13 @@ class Graphs:
 
     def frame(
         self,
-        place: tuple[float, float],
+        position: tuple[float, float],
         titles: tuple[str, str],
         x_axis: tuple[Scale, tuple[float, float]],
         scales: list[Scale],
     ) -> None:
         """Draw grid, box with a line at zero, and texts of a graph, its top left at a place."""
-        (x, y), (width, height) = place, self.layout.graph_size
+        (x, y), (width, height) = position, self.layout.graph_size
         across, (left, right) = x_axis
         low, high = extent(np.array([0.0, INTERVALS]))
         columns = np.arange(math.ceil(left), math.floor(right) + 1)
@@ -164,12 +164,12 @@ class Graphs:
         over_rows, over_columns = fro(rows, left, right), fro(columns[::-1], low, high)
         grid = np.concatenate([over_rows, [(right, low)], over_columns[:, ::-1]])
         pieces = pieces_of(grid[:, 0], grid[None, :, 1], (left, right))
-        self.line(f"{titles[0]}, grid", place, pieces, GRID)
+        self.line(f"{titles[0]}, grid", position, pieces, GRID)
         box = np.array([(left, low), (right, low), (right, high), (left, high), (left, low)])
         at_x = np.concatenate([box[:, 0], [left, right]])
         zeros = np.array([np.append(box[:, 1], s.intervals(np.zeros(2))) for s in scales])
         pieces = pieces_of(at_x, zeros, (left, right))
-        tag = self.line(f"{titles[0]}, zero", place, pieces, GREY)
+        tag = self.line(f"{titles[0]}, zero", position, pieces, GREY)
         self.gallery.color_texts(tag, DARK)
 
         def text(at_x: float, at_y: float, lines: list[str], align: str) -> None:
@@ -188,7 +188,7 @@ class Graphs:
     def line(
         self,
         name: str,
-        place: tuple[float, float],
+        position: tuple[float, float],
         pieces: Pieces,
         color: Color,
         points: bool = False,
@@ -202,8 +202,8 @@ class Graphs:
             [color],
             Type=4,
             AutoPosition=0,
-            PositionX=place[0],
-            PositionY=place[1],
+            PositionX=position[0],
+            PositionY=position[1],
             Width=self.layout.graph_size[0],
             Height=self.layout.graph_size[1],
             RangeType=2,

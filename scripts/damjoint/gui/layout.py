@@ -117,13 +117,13 @@ def open_window() -> None:
     gmsh.fltk.initialize()  # limits the sizes to the screen, and puts such a window at its top
     width, height = (gmsh.option.getNumber(f"General.{name}") for name in WINDOW[:2])
     gmsh.fltk.finalize()
-    places = {
+    positions = {
         "GraphicsPositionX": 0,
         "GraphicsPositionY": TITLE_BAR,
         "GraphicsWidth": width,
         "GraphicsHeight": height - TITLE_BAR - BORDER,
     }
-    for name, value in places.items():
+    for name, value in positions.items():
         gmsh.option.setNumber(f"General.{name}", value)
     gmsh.fltk.initialize()
     gmsh.option.setNumber("General.MenuWidth", min(MENU_WIDTH, int(MENU * width)))

@@ -50,8 +50,8 @@ class Pieces:
     def list_data(self) -> np.ndarray:
         """Gmsh's list data: all x, y, z of an element, then its values step by step."""
         count = len(self.points)
-        places = self.points.transpose(0, 2, 1).reshape(count, -1)
-        return np.hstack([places, self.values.transpose(1, 0, 2, 3).reshape(count, -1)])
+        positions = self.points.transpose(0, 2, 1).reshape(count, -1)
+        return np.hstack([positions, self.values.transpose(1, 0, 2, 3).reshape(count, -1)])
 
     def times(self, factor: float) -> Pieces:
         """The pieces with values multiplied by a factor."""
@@ -82,9 +82,9 @@ def arrow_labels(arrows: list[tuple[np.ndarray, list[str]]]) -> list[Label]:
         length = np.hypot(x, y)
         steep = abs(y) > abs(x)
         number = 0 if steep else sum(np.hypot(*(tail - t)[:2]) < length for t in tails)
-        place = tail + np.array([0.0, LINE * number * length, 0.0])
+        position = tail + np.array([0.0, LINE * number * length, 0.0])
         align = "Right" if x > 0 and not steep else "Left"
-        labels.append(Label(place, [f" {text} " for text in texts], align))
+        labels.append(Label(position, [f" {text} " for text in texts], align))
         tails += [] if steep else [tail]
     return labels
 

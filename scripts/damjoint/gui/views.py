@@ -26,7 +26,7 @@ from ..model.fields import (
 )
 from ..studies.quake import RUNNING
 from ..units import LENGTHS, STRESSES, unit, unit_of_time, with_unit
-from . import layout as places
+from . import layout as screen
 from .camera import CLIPPED, undeformed_camera
 from .curves import show_graphs
 from .gallery import (
@@ -128,8 +128,8 @@ def show_heading(gallery: Gallery, heading: tuple[str, str], layout: Layout) -> 
     """Show two lines: title of the case; joint law and uplift."""
     title, scene = heading
     shortened = layout.shortened(title, SIZES[0])
-    gallery.write(LEFT, places.TITLE, [shortened], DARK, SIZES[0])
-    gallery.write(LEFT, places.LAW, [scene], DARK, SIZES[1])
+    gallery.write(LEFT, screen.TITLE, [shortened], DARK, SIZES[0])
+    gallery.write(LEFT, screen.LAW, [scene], DARK, SIZES[1])
 
 
 def show(
@@ -157,12 +157,12 @@ def show(
             if case["dim"] == 3:
                 show_strips(gallery, deformed, display)
             captions = [caption(scene, step) for step in range(len(scene.times))]
-            for y, lines in zip(places.STATE, zip(*captions, strict=True), strict=True):
+            for y, lines in zip(screen.STATE, zip(*captions, strict=True), strict=True):
                 gallery.write(LEFT, y, list(lines), DARK, SIZES[2])
         show_graphs(Graphs(gallery, layout, display.common), scene, before)
         legend += [(GREY, "earlier runs")] if before else []
-        for place, (color, words) in zip(layout.legend, legend, strict=False):
-            gallery.write(*place, [words], color, SIZES[3])
+        for position, (color, words) in zip(layout.legend, legend, strict=False):
+            gallery.write(*position, [words], color, SIZES[3])
         show_warnings(gallery, scene.warnings, layout)
     record = f", {case.record.name}" if scene.quake is not None and case.record else ""
     law, uplift = (case.of_all_joints(name) for name in ("law", "uplift"))
@@ -259,7 +259,7 @@ def show_deformed(gallery: Gallery, deformed: Deformed, display: Display) -> lis
 
 def color_bar(number: int) -> dict[str, float]:
     """Options of a color scale at one of the places at the bottom left."""
-    x, y = places.BARS[number]
+    x, y = screen.BARS[number]
     return {"AutoPosition": 0, "PositionX": x, "PositionY": y, "Width": 130, "Height": 10}
 
 
@@ -284,14 +284,14 @@ def show_strips(gallery: Gallery, deformed: Deformed, display: Display) -> None:
         options: dict[str, float],
     ) -> int:
         low, high = deformed.camera.strip(number)
-        points = deformed.camera.place(low + shares * (high - low))
+        points = deformed.camera.points_at(low + shares * (high - low))
         faces = [
             Pieces(points[table], values)
             for (_, table), values in zip(joint.cells, pieces, strict=True)
         ]
         tag = gallery.add(name, faces, colors, **options, Light=0)
         head = low + [0, 1.12] * (high - low)
-        gallery.label_point(tag, deformed.camera.place(head[None])[0], [name], SIZES[3])
+        gallery.label_point(tag, deformed.camera.points_at(head[None])[0], [name], SIZES[3])
         gmsh.view.option.setColor(tag, "Text3D", *DARK[:3])
         return tag
 
@@ -323,10 +323,10 @@ def show_strips(gallery: Gallery, deformed: Deformed, display: Display) -> None:
 def show_warnings(gallery: Gallery, warnings: list[str], layout: Layout) -> None:
     """Show warnings at the bottom of the scene, as many lines as there is space for."""
     lines = [line for warning in warnings for line in layout.wrapped(f"! {warning}", SIZES[3])]
-    if len(lines) > places.WARNINGS:
-        lines = [*lines[: places.WARNINGS - 1], "... all notes are in Results"]
+    if len(lines) > screen.WARNINGS:
+        lines = [*lines[: screen.WARNINGS - 1], "... all notes are in Results"]
     for number, line in enumerate(lines):
-        y = -places.LINE * (len(lines) - number) + 8
+        y = -screen.LINE * (len(lines) - number) + 8
         gallery.write(LEFT, y, [line], ORANGE, SIZES[3])
 
 
@@ -341,18 +341,18 @@ def show_table(gallery: Gallery, scene: SolvedScene, layout: Layout) -> None:
         [*wrap(name, HEADING, break_long_words=False), f"[{size}]" if size else ""]
         for name, size in zip(table.names, table.units, strict=True)
     ]
-    top = TABLE_TOP + places.LINE * max(map(len, names)) + ROW / 2
+    top = TABLE_TOP + screen.LINE * max(map(len, names)) + ROW / 2
     count = min(int((layout.height - top) // ROW), len(table.rows))
     rows = np.unique(np.linspace(0, len(table.rows) - 1, count).round().astype(int)).tolist()
     columns = zip(names, zip(*table.rows, strict=True), strict=True)
     widths = [max(map(len, [*words, *cells])) + 3 for words, cells in columns]
-    room = (layout.width - 2 * LEFT) / places.CHARACTER / sum(widths)
+    room = (layout.width - 2 * LEFT) / screen.CHARACTER / sum(widths)
     size = int(np.clip(room, *FONT))
-    rights = LEFT + np.cumsum(widths) * size * places.CHARACTER
+    rights = LEFT + np.cumsum(widths) * size * screen.CHARACTER
     tag = gallery.write(LEFT, 0, [" "], DARK, size)
     for right, words, cells in zip(rights, names, zip(*table.rows, strict=True), strict=True):
         for line, word in enumerate(words):
-            gallery.label(tag, right, TABLE_TOP + places.LINE * line, [word], size, "Right")
+            gallery.label(tag, right, TABLE_TOP + screen.LINE * line, [word], size, "Right")
         for line, row in enumerate(rows):
             gallery.label(tag, right, top + ROW * line, [cells[row]], size, "Right")
     for line, row in enumerate(rows if scene.times.size else []):

@@ -113,8 +113,8 @@ class Parameter:
 
     def matters_in(self, values: Mapping[str, Value]) -> bool:
         """Whether the parameter matters with the values of all parameters."""
-        ways = [way.split(" and ") for way in self.matters.split(" or ")]
-        return not self.matters or any(all(holds(c, values) for c in way) for way in ways)
+        alternatives = [text.split(" and ") for text in self.matters.split(" or ")]
+        return not self.matters or any(all(holds(c, values) for c in both) for both in alternatives)
 
     def allowed(self) -> str:
         """The allowed values, as text."""

@@ -129,8 +129,8 @@ def figure_of_check(content: Content) -> Figure:
     draw_joint(section, joint_result, method)
     section.set_anchor("NW")
     handles, labels = section.get_legend_handles_labels()
-    place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (left - 0.02, 0.005)}
-    figure.legend(handles, labels, **place, ncols=2, fontsize=8, frameon=False, handlelength=3)
+    position: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (left - 0.02, 0.005)}
+    figure.legend(handles, labels, **position, ncols=2, fontsize=8, frameon=False, handlelength=3)
     beside.axis("off")
     height = min(ROW * len(cells), TALLEST)
     draw_verdicts(beside, cells, 1 - height, height)
@@ -162,7 +162,7 @@ def draw_scene(axes: Axes, method: GravityMethod, scene: Case) -> None:
     up, down, floor, bed = (by_height(faces[side]) for side in (UP, DOWN, FLOOR, BED))
     base, height = case["dam_base"], case["dam_height"]
     left, right = -BESIDE * base, (1 + BESIDE) * base
-    lowest_diagram = UnderJoint(method).place(ENDS, STRESS_AT + 1.2 * TALL)[1].min()
+    lowest_diagram = UnderJoint(method).position(ENDS, STRESS_AT + 1.2 * TALL)[1].min()
     lowest = min(-BELOW * height, bed[0, 1] - BELOW * height, lowest_diagram)
     ground = np.unique(np.concatenate([floor, bed]), axis=0)
     ends = [(ground[-1, 0], lowest), (ground[0, 0], lowest)]
@@ -243,7 +243,7 @@ class UnderJoint:
         self.down = np.array([self.along[1], -self.along[0]])
         self.unit_depth = max(body.length, SHORTEST * method.case["dam_base"])
 
-    def place(self, s: np.ndarray | float, depth: np.ndarray | float) -> np.ndarray:
+    def position(self, s: np.ndarray | float, depth: np.ndarray | float) -> np.ndarray:
         """Transform to x, y (2, ...) [m]."""
         axes = zip(self.heel, self.along, self.down, strict=True)
         return np.array([x + self.length * a * s + self.unit_depth * d * depth for x, a, d in axes])
@@ -293,13 +293,13 @@ def draw_joint(axes: Axes, result: Results, method: GravityMethod) -> None:
 
 def draw_lines(axes: Axes, under: UnderJoint, method: GravityMethod) -> None:
     """Draw the joint, its middle third, and the cracks by the gravity method."""
-    axes.plot(*under.place(ENDS, 0), color="black", linewidth=1.2)
-    axes.plot(*under.place((1 + ENDS) / 3, 0), color=GREEN, lw=3, label="middle third", zorder=3)
+    axes.plot(*under.position(ENDS, 0), color="black", linewidth=1.2)
+    axes.plot(*under.position((1 + ENDS) / 3, 0), color=GREEN, lw=3, label="middle third", zorder=3)
     if method.crack_length:
-        line = under.place(ENDS * method.crack_length / under.length, CRACK_AT)
+        line = under.position(ENDS * method.crack_length / under.length, CRACK_AT)
         axes.plot(*line, "--", color=RED, label=f"crack, {HAND}", zorder=4)
     for longer in method.further:
-        line = under.place(ENDS * longer.crack_length / under.length, LONGER_AT)
+        line = under.position(ENDS * longer.crack_length / under.length, LONGER_AT)
         axes.plot(*line, ":", color=RED, label=f"longer crack, {HAND}", zorder=4)
 
 
@@ -309,7 +309,7 @@ def draw_states(
     """Draw broken and softening part of the joint by the finite elements."""
     for number, order in ((BROKEN, 4), (SOFTENING, 2)):
         if (states == number).any():
-            line, style = under.place(s, np.where(states == number, 0, np.nan)), STATES[number]
+            line, style = under.position(s, np.where(states == number, 0, np.nan)), STATES[number]
             look = {"color": style.color, "linestyle": style.line, "linewidth": 3, "zorder": order}
             axes.plot(*line, **look, label=f"{style.label}, {label}")
 
@@ -323,22 +323,22 @@ def draw_diagram(axes: Axes, under: UnderJoint, diagram: Diagram, label: str) ->
 
     def outline(s: np.ndarray, values: np.ndarray) -> np.ndarray:
         closed = np.concatenate([[0], values, [0]])
-        return under.place(np.concatenate([[0], s, [1]]), depth + scale * closed)
+        return under.position(np.concatenate([[0], s, [1]]), depth + scale * closed)
 
-    axes.plot(*under.place(ENDS, depth), color="black", linewidth=0.6)
+    axes.plot(*under.position(ENDS, depth), color="black", linewidth=0.6)
     if len(computed[0]):
         axes.fill(*outline(*computed), color=diagram.color, alpha=0.35, linewidth=0)
-        line = under.place(computed[0], depth + scale * computed[1])
+        line = under.position(computed[0], depth + scale * computed[1])
         axes.plot(*line, color=diagram.color, label=label)
     axes.plot(*outline(*by_hand), "--", color="black", linewidth=1)
     above: dict[str, Any] = {"xytext": (0, NAME_ABOVE), "textcoords": "offset points"}
-    axes.annotate(diagram.name, tuple(under.place(0.5, depth)), **above, ha="center", fontsize=9)
+    axes.annotate(diagram.name, tuple(under.position(0.5, depth)), **above, ha="center", fontsize=9)
     for end, s, side in ((0, -0.015, "right"), (-1, 1.015, "left")):
         values = {"FE": computed[1], "gravity": by_hand[1]}
         shown = {name: f"{v[end] * factor:.3g} {size}" for name, v in values.items() if len(v)}
         same = len(set(shown.values())) == 1
         lines = [shown["gravity"]] if same else [f"{name} {v}" for name, v in shown.items()]
-        x, y = under.place(s, depth)
+        x, y = under.position(s, depth)
         axes.text(x, y, "\n".join(lines), ha=side, va="center", fontsize=8)
 
 
@@ -351,5 +351,5 @@ def draw_resultant(
         return
     back = ARROW / size
     height = back * last["N"] * under.length / under.unit_depth
-    start, end = under.place(s - back * last["T"], -height), under.place(s, 0)
+    start, end = under.position(s - back * last["T"], -height), under.position(s, 0)
     axes.annotate("", tuple(end), tuple(start), arrowprops=arrow_style(color, linestyle=style))

@@ -39,8 +39,8 @@ def figure(natural: NaturalModes, about: str) -> Figure:
     y = 1 - 0.1 / height
     picture.text(0.1 / width, y, "\n".join(words), va="top", fontsize=9, parse_math=False)
     for k in range(number):
-        place = (0.1 + k * PANEL) / width, foot / height, 0.96 * PANEL / width, PANEL / height
-        axes = picture.add_axes(place)
+        position = (0.1 + k * PANEL) / width, foot / height, 0.96 * PANEL / width, PANEL / height
+        axes = picture.add_axes(position)
         draw_shape(axes, natural, first, k)
         mode = first.modes[k]
         title = f"mode {k + 1}: {mode.frequency:.3g} Hz, {1 / mode.frequency:.3g} s\n"
@@ -66,11 +66,11 @@ def draw_shape(axes: Axes, natural: NaturalModes, variant: Variant, number: int)
         body = mesh.solids[name]
         full = np.zeros((len(body.points), 3))
         full[:, : mesh.dim] = moved
-        places = (body.points + scale * full) @ view
+        positions = (body.points + scale * full) @ view
         near += [body.points @ view] if name != "foundation" else []
         for table, _ in skin(body):
-            faces += list(places[table, :2])
-            depths.append(places[table, 2].mean(axis=1))
+            faces += list(positions[table, :2])
+            depths.append(positions[table, 2].mean(axis=1))
             colors += [ROCK if name == "foundation" else CONCRETE] * len(table)
     order = np.argsort(np.concatenate(depths), kind="stable")
     cells = PolyCollection([faces[i] for i in order], facecolor=[colors[i] for i in order])

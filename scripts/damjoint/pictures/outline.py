@@ -102,9 +102,9 @@ class PlaneBody:
         cross = area_between(start, end)
         return cross @ (start + end) / (3 * cross.sum())
 
-    def nearest(self, place: np.ndarray) -> int:
+    def nearest(self, position: np.ndarray) -> int:
         """Index in the outline of the point nearest to a place (2,)."""
-        return int(np.argmin(((self.points[self.loop] - place) ** 2).sum(axis=1)))
+        return int(np.argmin(((self.points[self.loop] - position) ** 2).sum(axis=1)))
 
     def between(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
         """Point numbers of the outline between the points nearest to two places (2,)."""
@@ -194,8 +194,8 @@ def union(bodies: list[PlaneBody]) -> PlaneBody:
     for start, body in zip(starts, bodies, strict=False):
         for name, tables in body.faces.items():
             faces.setdefault(name, []).extend(table + start for table in tables)
-    places = np.round(points / np.ptp(points, axis=0).max(), 9)
-    _, first, same = np.unique(places, axis=0, return_index=True, return_inverse=True)
+    positions = np.round(points / np.ptp(points, axis=0).max(), 9)
+    _, first, same = np.unique(positions, axis=0, return_index=True, return_inverse=True)
     glued = first[same.ravel()]  # points of the same place as a single one
     tables = [glued[table] for of_region in faces.values() for table in of_region]
     return PlaneBody(points, moved, faces, boundary(points, tables))

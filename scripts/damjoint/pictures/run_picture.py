@@ -311,9 +311,9 @@ def mark_states(figure: AnyFigure, results: list[Results], time: float) -> None:
     occurring = [STATES[n].patch() for n in STATES if any((part == n).any() for part in states)]
     if occurring:
         above = ABOVE_EDGE / size_of(figure)[1]
-        place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.1, above)}
+        position: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.1, above)}
         style: dict[str, Any] = {"fontsize": 7.5, "frameon": False, "borderpad": 0.2}
-        figure.legend(handles=occurring, ncols=len(occurring), **place, **style)
+        figure.legend(handles=occurring, ncols=len(occurring), **position, **style)
 
 
 def draw_jumps(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> None:
@@ -435,11 +435,11 @@ def draw_history(figure: AnyFigure, shown: list[Panel], result: Results) -> None
             style = LINES[number % len(LINES)]
             axes.plot(level, values * factor, style, color=color, markersize=3, label=label)
         for step, text in marks:
-            place = level[step], lines[0][0][step] * factor
-            axes.plot(*place, "o", color=RED, markersize=8, mfc="none", label="_changed")
+            position = level[step], lines[0][0][step] * factor
+            axes.plot(*position, "o", color=RED, markersize=8, mfc="none", label="_changed")
             away = {"xytext": (-7, -2), "textcoords": "offset points"}
             # below the mark: above it the frame of the panel would cross the text
-            axes.annotate(text, place, **away, ha="right", va="top", fontsize=7, color=RED)
+            axes.annotate(text, position, **away, ha="right", va="top", fontsize=7, color=RED)
         if not high or axes is row[-1]:
             axes.set_xlabel("reservoir level [m]", fontsize=9)
         axes.set_ylabel(f"{quantity} [{name}]", fontsize=8.5)
@@ -574,11 +574,11 @@ def draw_view(figure: AnyFigure, solution: Solution, time: float) -> None:
     polygons, depths, values, near = [], [], [], []
     for name, displacement in field.displacement.items():
         body = solution.bodies[name]
-        places = (body.points + scale * displacement) @ VIEW
-        near += [places] if name != "foundation" else []
+        positions = (body.points + scale * displacement) @ VIEW
+        near += [positions] if name != "foundation" else []
         for table, _ in skin(body):
-            polygons += list(places[table, :2])
-            away = places[table, 2]
+            polygons += list(positions[table, :2])
+            away = positions[table, 2]
             # the ground by its farthest corner: the water lies on it
             depths.append(away.min(axis=1) if name == "foundation" else away.mean(axis=1))
             values.append(sizes[name][table].mean(axis=1) * factor)
@@ -614,8 +614,8 @@ def draw_directions(axes: Axes, level: str) -> None:
     for direction, name in zip(VIEW[:, :2], ("x, downstream", "y", "z"), strict=True):
         end = start + 0.1 * direction
         style = {"arrowstyle": "-|>", "color": DARK, "shrinkA": 0, "shrinkB": 0}
-        place: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "axes fraction"}
-        axes.annotate("", tuple(end), tuple(start), **place, arrowprops=style, zorder=5)
+        position: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "axes fraction"}
+        axes.annotate("", tuple(end), tuple(start), **position, arrowprops=style, zorder=5)
         x, y = start + 0.135 * direction
         axes.text(x, y, name, transform=axes.transAxes, ha="center", va="center", fontsize=8)
     words = f"behind the dam, upstream: reservoir, {level}" if level else "upstream behind the dam"
@@ -651,10 +651,10 @@ def draw_openings(figure: AnyFigure, solution: Solution, time: float) -> None:
             axes.remove()
             continue
         surface = joint_body(solution.bodies, number)
-        names, places = projected(surface)
+        names, positions = projected(surface)
         values = openings[number][nearest_rows(surface.points, rows[number])]
         colors = axes.tripcolor(
-            Triangulation(places[0], places[1], triangles_of(surface)),
+            Triangulation(positions[0], positions[1], triangles_of(surface)),
             values,
             cmap="YlOrRd",
             vmin=0,
@@ -685,8 +685,8 @@ def draw_maps(figure: AnyFigure, solution: Solution, time: float) -> None:
     """
     rows, joint = solution.result.at(time), solution.bodies["joint"]
     nearest = nearest_rows(joint.points, rows)
-    names, places = projected(joint)
-    shape = Triangulation(places[0], places[1], triangles_of(joint))
+    names, positions = projected(joint)
+    shape = Triangulation(positions[0], positions[1], triangles_of(joint))
     shown = (
         ("delta_n", "opening > 0, overlap < 0", LENGTHS),
         ("sigma_n_eff", "effective normal stress, tension > 0", STRESSES),

@@ -135,10 +135,10 @@ def state_label(case: Case, state: Mapping[str, float]) -> str:
     factor = gravity.sliding_factor(case, state["N"], state["T"], state["bonded_length"])
     known = case.law.has_friction and np.isfinite(factor)
     where = gravity.position(state["x_resultant"], case.joint_length)
-    place = (
+    acting = (
         f"N' at {state['x_resultant']:.3g} m: {where}" if np.isfinite(state["x_resultant"]) else ""
     )
-    return ", ".join(filter(None, [*forces, f"SSF {factor:.3g}" if known else "", place]))
+    return ", ".join(filter(None, [*forces, f"SSF {factor:.3g}" if known else "", acting]))
 
 
 def level_label(level: float) -> str:
@@ -181,11 +181,11 @@ def marked(case: Case, bodies: Mapping[str, Body]) -> dict[str, Array]:
     corners = zip(
         section["mark_region"], section.get("mark_x", ()), section.get("mark_y", ()), strict=False
     )
-    places = {
+    positions = {
         regions[number]: np.array([x, y, depth]) for number, x, y in corners if number in regions
     }
     of_mesh = {name: bodies[name].points for name in regions.values() if name in bodies}
-    return places | {name: line[line[:, 2].argmax()] for name, line in of_mesh.items()}
+    return positions | {name: line[line[:, 2].argmax()] for name, line in of_mesh.items()}
 
 
 def is_extruded(case: Case) -> bool:
@@ -274,10 +274,10 @@ class Scene:
         order = order[np.unique([*range(0, len(order), every), len(order) - 1])]
         of_joints = self.case.of_joints
         names = (of_joints[number].upper, of_joints[number].lower) if of_joints else BODIES
-        places = joint.points[near][order]
+        positions = joint.points[near][order]
         # by their places: the bodies of a stored run have other tags
         upper, lower = (
-            nearest_rows(places, dict(zip("xyz", self.bodies[name].points.T, strict=True)))
+            nearest_rows(positions, dict(zip("xyz", self.bodies[name].points.T, strict=True)))
             for name in names
         )
         states = [result.state(time) for time in self.times]
@@ -378,8 +378,8 @@ def water_surface(bodies: Mapping[str, Body], level: float) -> list[Array]:
     if size <= 0 or level <= ground[:, 1].min():
         return []
     x, z = (np.linspace(a, b, 1 + round((b - a) / size)) for a, b in ((left, right), (back, front)))
-    places = np.stack(np.meshgrid(x, z), axis=-1)
-    heights = ground_heights(bodies["foundation"], places.reshape(-1, 2)).reshape(len(z), len(x))
+    positions = np.stack(np.meshgrid(x, z), axis=-1)
+    heights = ground_heights(bodies["foundation"], positions.reshape(-1, 2)).reshape(len(z), len(x))
     generator = contour_generator(
         *(x, z, heights), fill_type=FillType.ChunkCombinedOffset, chunk_size=1
     )
@@ -391,7 +391,7 @@ def water_surface(bodies: Mapping[str, Body], level: float) -> list[Array]:
     ]
 
 
-def ground_heights(ground: Body, places: Array) -> Array:
+def ground_heights(ground: Body, positions: Array) -> Array:
     """Height of the top of the ground at places (n, 2): x, z. Between its nodes it is linear."""
     halves = [
         ground.points[table[:, [0, k, k + 1]]]
@@ -405,9 +405,9 @@ def ground_heights(ground: Body, places: Array) -> Array:
     lying = np.abs(area) > ROUND_OFF * (first**2 + second**2).sum(axis=1)  # others are vertical
     start, first, second, area = (values[lying] for values in (flat[:, 0], first, second, area))
     corners = triangles[lying, :, 1]
-    heights = np.empty(len(places))
-    for i, place in enumerate(places):
-        u, v = area_between(place - start, second) / area, area_between(first, place - start) / area
+    heights = np.empty(len(positions))
+    for i, away in enumerate(positions[:, None] - start):
+        u, v = area_between(away, second) / area, area_between(first, away) / area
         inside = np.minimum(np.minimum(u, v), 1 - u - v) > -INSIDE
         parts = np.column_stack([1 - u - v, u, v])[inside]
         heights[i] = (parts * corners[inside]).sum(axis=1).max(initial=ground.points[:, 1].min())

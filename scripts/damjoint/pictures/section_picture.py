@@ -223,9 +223,10 @@ class SectionDrawing:
                 x, y, _ = self.scene.on_joint(joint, joint.case["drain_x"])[0]
                 self.axes.plot([x, x], [y, y - DRAIN * self.height], **DRAINS, zorder=3)
                 at.setdefault(f"{joint.case['drain_x']:.3g}", []).append(k)
-        for place, joints in at.items():
+        for x_drains, joints in at.items():
             name = f" of {self.case.named(joints)}" if len(at) > 1 else ""
-            self.legend.append((Line2D([], [], **DRAINS), f"drains{name}, {place} m from the heel"))
+            label = f"drains{name}, {x_drains} m from the heel"
+            self.legend.append((Line2D([], [], **DRAINS), label))
 
     def forces(self) -> None:
         """Draw arrows of ice, additional force, anchor and earthquake, of those that act."""

@@ -40,8 +40,8 @@ def figure(drawn: Sequence[Mapping[str, Value]], title: str) -> Figure:
     rows = np.arange(len(drawn))
     by = "one standard deviation" if "deviation" in drawn[0] else "1 %"
     for k, head in enumerate(heads):
-        place = (1.4 + k * PANEL) / width, 0.55 / height, 0.85 * PANEL / width
-        axes = picture.add_axes((*place, BAR * len(drawn) / height))
+        position = (1.4 + k * PANEL) / width, 0.55 / height, 0.85 * PANEL / width
+        axes = picture.add_axes((*position, BAR * len(drawn) / height))
         sizes = np.array([float(cells[head]) for cells in drawn])
         axes.barh(rows, sizes, color=BLUE, label=f"{by} more")
         axes.barh(rows, -sizes, color=ORANGE, label=f"{by} less")

@@ -77,10 +77,10 @@ def figure(results: Results) -> Figure:
 
     times = [t for t in np.unique(result.joint["time"]) if t >= case["time_start"] - 1e-9]
     tables = [result.at(t) for t in times]
-    s, place, number = np.unique(
+    s, inverse, number = np.unique(
         tables[0]["s"].round(9), return_inverse=True, return_counts=True
     )  # in 3D a mean over the nodes at a distance from the heel
-    values = np.array([np.bincount(place, table["p"]) / number for table in tables]).T / 1e3
+    values = np.array([np.bincount(inverse, table["p"]) / number for table in tables]).T / 1e3
     if len(times) > 1:
         mesh = chart.pcolormesh(
             in_unit(np.array(times)), s, values, shading="nearest", rasterized=True

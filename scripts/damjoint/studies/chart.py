@@ -384,8 +384,8 @@ def draw_points(axes: Axes, rows: list[Row], names: list[str]) -> None:
     else:
         for shown, mark, color, text in ((~bad, "o", BLUE, "stands"), (bad, "x", RED, "fails")):
             if shown.any():
-                places = [v[shown] for v in inputs]
-                axes.plot(*places, mark, color=color, markersize=3.5, label=text)
+                positions = [v[shown] for v in inputs]
+                axes.plot(*positions, mark, color=color, markersize=3.5, label=text)
         axes.set(ylabel=labels[1])
         axes.grid(alpha=0.3)
         axes.ticklabel_format(scilimits=(-3, 4))

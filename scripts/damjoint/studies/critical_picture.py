@@ -75,8 +75,8 @@ class Content(NamedTuple):
             names = result.case.joint_names
             k = names.index(answer.joint) if answer.joint in names else 0
             name = f"{names[k]}, last equilibrium" if self.case.of_joints else "last equilibrium"
-            own = result.joints[k]
-            facts.append(f"{name}: {state_label(own.case, own.last)}")
+            of_joint = result.joints[k]
+            facts.append(f"{name}: {state_label(of_joint.case, of_joint.last)}")
         return facts
 
     @property
@@ -110,8 +110,8 @@ def figure_of(content: Content) -> Figure:
     rows = figure.subfigures(2, 1, squeeze=False, height_ratios=(head, HEIGHT))
     top, below = rows[:, 0]
     for texts, y, size in ((title, 0.08, 11), (lines, 0.12 + 0.2 * len(title), 9)):
-        place = 0.1 / width, 1 - y / head
-        top.text(*place, "\n".join(texts), va="top", fontsize=size, parse_math=False)
+        position = 0.1 / width, 1 - y / head
+        top.text(*position, "\n".join(texts), va="top", fontsize=size, parse_math=False)
     of_curves = below
     if content.solution:
         ratios = wide, CURVE * curves
@@ -126,8 +126,8 @@ def figure_of(content: Content) -> Figure:
         widen(axes.yaxis)
         axes.grid(alpha=0.3)
         if axes.get_legend_handles_labels()[0]:  # an interrupted search may have no trial
-            place = 0, -0.5 / (HEIGHT - LEGEND - 0.2)
-            axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=place, frameon=False)
+            position = 0, -0.5 / (HEIGHT - LEGEND - 0.2)
+            axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=position, frameon=False)
     return figure
 
 

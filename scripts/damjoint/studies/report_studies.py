@@ -243,8 +243,8 @@ def fragility(path: Path, info: Mapping[str, Any]) -> dict[str, Any]:
     ]
     names = ["limit", "rows", "exceed it", "undecided", "median", "95 %: from", "to", "dispersion"]
     picture = beside(path, FRAGILITY[1])
-    found = [c for c in curves if c["median"]]
-    medians = (f"{c['limit']}: median {float(c['median']):.3g} {size}" for c in found)
+    known = [c for c in curves if c["median"]]
+    medians = (f"{c['limit']}: median {float(c['median']):.3g} {size}" for c in known)
     return {
         "answer": "; ".join(medians) or "no curve",
         "sentences": [
