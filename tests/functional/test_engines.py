@@ -530,6 +530,23 @@ IN_TIME = {
         {"time_unit": 1.0, "storage": 1e-11, "pressure_min": -1e5, "drains": 1.0, "drain_x": 4.0},
         (30.0, 44.0, 20.0),
     ),
+    "inclined": (
+        {"time_unit": 1.0, "storage": 1e-11, "pressure_min": -1e5, "joint_slope": 3.0},
+        (30.0, 44.0, 20.0),
+    ),
+    # air enters at the dry toe, and a node gives no more water than it has
+    "inclined, drains and air": (
+        {
+            "dam_height": 6.71,
+            "dam_base": 5.3,
+            "dam_crest": 0.414,
+            "joint_slope": 3.36,
+            "drains": 1.0,
+        }
+        | {"drain_effectiveness": 0.8, "pressure_min": -1e5, "time_unit": 2400.0}
+        | {"law": "bond", "n_joint": 8.0, "aperture_min": 8.85e-5},
+        (6.8,),
+    ),
     "a crack that fills": ({"time_unit": 600.0, "storage": 1e-12, "order": 2.0}, (30.0, 44.0)),
     "a film that closes": ({"time_unit": 5.0, "storage": 1e-12}, (30.0, 44.0, 20.0)),
     "steady before": ({"time_unit": 60.0, "time_start": 1.0, "weight_first": 1.0}, (30.0, 44.0)),
@@ -549,9 +566,7 @@ def test_runs_of_both_engines_agree_on_water_in_time(scene, tmp_path):
         assert fast.history["void"].max() > 1e-6
 
 
-@pytest.mark.parametrize(
-    "settings", [{"joint_slope": 3.0}, {"pressure_step": 1e4}, {"drive": "heel"}]
-)
+@pytest.mark.parametrize("settings", [{"pressure_step": 1e4}, {"drive": "heel"}])
 def test_water_in_time_that_one_engine_can_not_compute_is_refused(settings):
     case = load("dam", {"uplift": "flow", "time_unit": 60.0} | settings, (30.0, 40.0))
     (name,) = settings

@@ -62,7 +62,6 @@ def check_joint(joint: Case) -> None:
 
 #: What this engine does not include with flow in time, and why.
 NOT_IN_TIME = {
-    "joint_slope": "in it no water runs down from a node with voids",
     "pressure_step": "its steps do not follow the pressure",
 }
 
