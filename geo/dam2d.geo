@@ -4,7 +4,8 @@
 // spaces on the same nodes (pro/spaces.pro). Element sizes grow with the distance from the joint.
 //
 // Takes     the section: pro/section.pro; parameters of the mesh; lift_drain_x(j - 1): distance of
-//           the drains from the heel of joint j > 0, 0 if it has none
+//           the drains from the heel of joint j > 0, 0 if it has none; node_points: 1 if the nodes
+//           of joints that store water are to be points, for pro/flow_in_time.pro
 // Provides  physical groups (in 3D by dam3d.geo): the bodies, joints with their heels and toes,
 //           crest, fixed boundary, faces SEGMENT + i, line forces mark_region(k)
 //           for dam3d.geo: surfaces dam(j) above joint j, foundation(), lower(); side_names(); of
@@ -18,6 +19,13 @@ Include "../pro/parameters.pro";
 DRAIN_TAG = 100;
 DAM_SURFACE = 1;
 FIRST_LIFT = 100;
+// Of points and curves at the nodes of the joints, from here on
+AT_NODES = 100000;
+DefineConstant[ node_points = 0 ];
+with_points = (node_points && time_unit > 0 && dim == 2);
+If(with_points && !StrCmp(mesh_pattern, "regular"))
+  Error("mesh_pattern = regular: must be free with time_unit in Gmsh and GetDP alone");
+EndIf
 
 h_joint = joint_length / n_joint;
 regular = !StrCmp(mesh_pattern, "regular");
@@ -31,6 +39,7 @@ EndIf
 all_first() = {};
 all_rest() = {};
 first_curve() = {};
+last_curve() = {};
 drain_point() = {};
 drain_point_x() = {};
 drain_point_y() = {};
@@ -60,15 +69,37 @@ For j In {0 : top}
     n_first = (n_first < number) ? n_first : number - 1;
     n_first = (n_first < 1) ? 1 : n_first;
     n_rest = (n_first < number) ? number - n_first : 1;
-    middle = (j == 0) ? DRAIN_TAG : newp;
-    Point(middle) = {drain_point_x(j), drain_point_y(j), 0, h_joint};
+    If(!with_points)
+      middle = (j == 0) ? DRAIN_TAG : newp;
+      Point(middle) = {drain_point_x(j), drain_point_y(j), 0, h_joint};
+    EndIf
   EndIf
   all_first() += n_first;
   all_rest() += n_rest;
   drain_point() += middle;
-  line = newl;
-  Line(line) = {heel, middle};
-  Transfinite Curve {line} = n_first + 1;
+  If(with_points)
+    line = AT_NODES * (1 + j) + 1;
+    from = heel;
+    first_part = (n_rest > 0) ? drains_at / length : 1;
+    number = n_first + n_rest;
+    For k In {1 : number}
+      point = (k < number) ? line + k : toe;
+      If(k < number)
+        part = (k <= n_first) ? first_part * k / n_first
+                              : 1 - (1 - first_part) * (number - k) / n_rest;
+        Point(point) = {all_heel_x(j) + dx * part, all_heel_y(j) + dy * part, 0, h_joint};
+      EndIf
+      Line(line + k - 1) = {from, point};
+      Transfinite Curve {line + k - 1} = 2;
+      from = point;
+    EndFor
+    last_curve() += line + number - 1;
+  Else
+    line = newl;
+    Line(line) = {heel, middle};
+    Transfinite Curve {line} = n_first + 1;
+    last_curve() += line;
+  EndIf
   first_curve() += line;
   known_x() += {all_heel_x(j), all_toe_x(j)};
   known_y() += {all_heel_y(j), all_toe_y(j)};
@@ -145,8 +176,8 @@ EndFor
 joint_curves() = {};
 joint_start() = {0};
 For j In {0 : top}
-  joint_curves() += first_curve(j);
-  If(all_rest(j) > 0)
+  joint_curves() += {first_curve(j) : last_curve(j)};
+  If(all_rest(j) > 0 && !with_points)
     line = (j == 0) ? DRAIN_TAG : newl;
     Line(line) = {drain_point(j), known_point(2 * j + 1)};
     Transfinite Curve {line} = all_rest(j) + 1;
@@ -376,6 +407,10 @@ If(dim == 2)
     Physical Curve(StrCat("joint", suffix), JOINT + j * LAYER) = {curves()};
     Physical Point(StrCat("heel", suffix), HEEL + j * LAYER) = {known_point(2 * j)};
     Physical Point(StrCat("toe", suffix), TOE + j * LAYER) = {known_point(2 * j + 1)};
+    If(with_points)
+      inner() = {first_curve(j) + 1 : last_curve(j)};
+      Physical Point(NODES + j * LAYER) = {known_point(2 * j), inner(), known_point(2 * j + 1)};
+    EndIf
   EndFor
   Physical Surface("foundation", FOUNDATION) = {foundation()};
   Physical Surface("lower dam", LOWER) = {lower()};

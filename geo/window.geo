@@ -30,6 +30,7 @@ DefineConstant[
     Highlight "LightGrey"}
 ];
 
+node_points = 1;
 If(!Exists(geometry))
   Include "dam.geo";
 EndIf

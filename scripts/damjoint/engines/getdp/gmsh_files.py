@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import TypeAlias
 
 import numpy as np
@@ -29,6 +30,10 @@ ENTITIES = "Point", "Curve", "Surface", "Volume"
 #: Entities of the regions, by dimension and number.
 Regions: TypeAlias = dict[tuple[int, int], list[int]]
 
+#: Lines of NAME.geo and NAME.pro of a case with a hydrograph.
+MADE_OF_FLOOD = "// Made by python -m damjoint_tools.gmsh_files from the hydrograph.\n"
+WINDOW = 'Include "../geo/window.geo";\n'
+
 MADE = "// Made by python -m damjoint_tools.gmsh_files, for dim = {dim}.\n"
 
 
@@ -41,6 +46,11 @@ def write_gmsh_files(cases: Sequence[Case], folder: Path) -> None:
     texts = dict[str, tuple[str, str]]()
     for case in cases:
         geometry = case.geometry
+        if not geometry and case.source and "hydrograph" in case.source.text.texts:
+            check(case)
+            flood = MADE_OF_FLOOD + text_of_flood(case)
+            texts[case.name] = flood + WINDOW, flood
+            continue
         if not geometry or geometry.suffix != ".geo":
             raise InputError(f"geometry = {geometry}: must be a .geo file")
         check(case)
@@ -74,7 +84,7 @@ def regions_text(geometry: Path, mesh: Mesh) -> str:
     turned = sorted(inverse.difference(*turned_joints(regions, inverse, mesh).values()))
     return (
         MADE.format(dim=mesh.dim)
-        + 'Include "../geo/window.geo";\n'
+        + WINDOW
         + f'Include "../geo/{geometry.name}";\n'
         + f"If(dim != {mesh.dim})\n"
         + f'  Error("dim = %g: must be {mesh.dim}, as the regions in this file", dim);\n'
@@ -82,10 +92,20 @@ def regions_text(geometry: Path, mesh: Mesh) -> str:
         + "Mesh.MshFileVersion = 2.2;\n"
         + "Delete Physicals;\n"
         + "".join(
-            f"Physical {ENTITIES[d]}({tag}) = {{{numbers(of_region)}}};\n"
+            fill(f"Physical {ENTITIES[d]}({tag}) = {{{numbers(of_region)}}};", 100) + "\n"
             for (d, tag), of_region in regions.items()
         )
         + (f"ReverseMesh {ENTITIES[mesh.dim - 1]} {{{numbers(turned)}}};\n" if turned else "")
+    )
+
+
+def text_of_flood(case: Case) -> str:
+    """The levels of a hydrograph, which Gmsh and GetDP can not read, and what follows from it."""
+    lists = {"levels": case.levels, "tail_levels": case.tail_levels}
+    values = {f"default_{name}": case[name] for name in ("time_unit", "time_start")}
+    return rounded(
+        "".join(listing(name, values) for name, values in lists.items())
+        + "".join(f"{name} = {value!r};\n" for name, value in values.items())
     )
 
 

@@ -104,7 +104,7 @@ def user_lists(mesh: Mesh) -> dict[str, list[float]]:
         "own_bodies": [float(len(number))],
         "own_first_heel": [length, *heel_normal(mesh.joints[0].surface, heel)],
         "own_crest_body": [number[mesh.bearer("crest")]],
-        "own_quadrangles": [float("quad" in shapes)],
+        "own_quadrangles": [float(not shapes <= {"triangle", "tetra"})],
         "own_mark_region": [constants()[name.upper()][0] for name in lines],
         "own_mark_body": [number[mesh.bearer(name)] + lowest for name in lines],
         **({"own_traction_body": under_traction} if under_traction else {}),
@@ -300,7 +300,7 @@ class Runner:
             case,
             mesh,
             folder,
-            {"views": 0.0, "fields": float(fields), "node_points": float(case.stores_water)},
+            {"views": 0.0, "fields": float(fields)},
         )
         steps, of_joints = [], []
 

@@ -23,15 +23,15 @@ from .. import OnStep, Outcome
 from . import process, tables
 from .paths import has_level_ends, values_of_paths
 
-#: Mesh patterns in 3D: GetDP has no suitable quadrature for prisms and hexahedra.
+#: Mesh patterns in 3D with order 2: GetDP has no such functions on prisms and hexahedra.
 SOLID = ("free", "split")
 
 
 def check(case: Case) -> None:
     """Raise InputError if there is no GetDP, or it cannot run the case."""
     process.find_getdp()
-    if case["dim"] == 3:
-        rule = f"be one of {', '.join(SOLID)} with engine = getdp in 3D"
+    if case["dim"] == 3 and case["order"] == 2:
+        rule = f"be one of {', '.join(SOLID)} with engine = getdp and order = 2 in 3D"
         require(case["mesh_pattern"] in SOLID, "mesh_pattern", case["mesh_pattern"], rule)
     if case.geometry:
         mesh = mesh_of(case)
@@ -80,8 +80,13 @@ def check_flow_in_time(joint: Case) -> None:
 def check_user_mesh(mesh: Mesh, case: Case) -> None:
     """Raise InputError if this engine cannot run a user's own geometry."""
     shapes = {shape for solid in mesh.solids.values() for shape, _ in solid.cells}
-    suits = mesh.dim == 2 or shapes == {"tetra"}
-    require(suits, "geometry", str(case.geometry), "have tetrahedra with engine = getdp")
+    suits = mesh.dim == 2 or shapes == {"tetra"} or case["order"] == 1
+    rule = "have tetrahedra with engine = getdp and order = 2"
+    require(suits, "geometry", str(case.geometry), rule)
+    for joint in mesh.joints:
+        rule = f"have triangles or quadrangles in joint {joint.name}, not both, with engine = getdp"
+        faces = {shape for shape, _ in joint.surface.cells}
+        require(len(faces) == 1, "geometry", str(case.geometry), rule)
     if mesh.divided:
         mesh.face_entities()
     values_of_paths(mesh, case)

@@ -159,11 +159,13 @@ def read_joint(
         [when, nodes, jump[:, order], traction[:, order], state, distance, *others]
     )
     extrapolated = averaged.copy()
-    corners, _ = table("mean_jump_0")
+    file = folder / f"mean_jump_0_{joint}_{number}.txt"
+    corners, _ = read_simple_table(file)
     _, corner_rows = nodes_of(np.vstack([nodes, corners]))
     corner_rows = corner_rows[len(nodes) :]
     present = np.unique(corner_rows)
-    count = int(case["dim"])  # corners of an element
+    with file.open() as lines:
+        count = len(corners) // sum(1 for _ in lines)  # corners of an element
     for columns, name in (slice(6, 9), "jump"), (slice(9, 12), "traction"):
         moments = np.array([table(f"mean_{name}_{k}")[1] for k in range(len(MOMENTS))])
         values = corner_values(corners.reshape(-1, count, 3), moments[:, ::count])
@@ -178,12 +180,14 @@ MOMENTS = "1", "x", "y", "z"
 
 
 def corner_values(corners: np.ndarray, moments: np.ndarray) -> np.ndarray:
-    """Values (elements x corners, 3) at the corners (elements, n, 3) of lines or triangles, from
-    means over each element of a quantity times MOMENTS (4, elements, 3): the linear function with
-    these means, or a constant if they are those of one Gauss point.
+    """Values (elements x corners, 3) at the corners (elements, n, 3) of lines, triangles or
+    quadrangles, from means over each element of a quantity times MOMENTS (4, elements, 3): the
+    linear function with these means, or a constant if they are those of one Gauss point.
     """
     count = corners.shape[1]
     products = (1 + np.eye(count)) / (count * (count + 1))  # means of two nodal functions
+    if count == 4:  # of a parallelogram
+        products = np.array([np.roll([4, 2, 1, 2], k) for k in range(4)]) / 36
     middle = corners.mean(axis=1, keepdims=True)
     about = moments[1:] - middle.transpose(2, 0, 1) * moments[0]
     slopes = np.linalg.pinv((corners - middle).transpose(0, 2, 1) @ products, rcond=1e-9)
