@@ -252,25 +252,28 @@ def test_values_of_joints_are_those_of_python():
     assert set(listed("joint_automatic")) == {n for n, known in own.items() if known.automatic}
 
 
-@pytest.mark.parametrize("given, steps", [("default_dt = 0.02;\n", 3), ("", 12)])
-def test_an_earthquake_has_the_time_step_of_its_problem(project, given, steps):
+@pytest.mark.parametrize(
+    "name, given, steps",
+    [("dam", "default_dt = 0.02;\n", 3), ("dam", "", 12), ("stepped", "default_dt = 0.02;\n", 3)],
+)
+def test_an_earthquake_has_the_time_step_of_its_problem(project, name, given, steps):
     """As Gmsh's tree, made by the .geo file, has none (-1): that of the .pro file with the record,
     or half of the record's shortest interval.
     """
-    lines = (project / "dam.pro").read_text().splitlines(keepends=True)
+    lines = (project / f"{name}.pro").read_text().splitlines(keepends=True)
     record = "record_x() = {0, 0, 0.01, 0.5, 0.06, 0}; record_y() = {0, 0, 0.06, 0};\n"
     record += "damping_a0 = 0; damping_a1 = 1e-3;\n"
-    (project / "dam.pro").write_text("".join([*lines[:-1], record, given, lines[-1]]))
+    (project / f"{name}.pro").write_text("".join([*lines[:-1], record, given, lines[-1]]))
     coarse = {"n_joint": 6, "order": 1, "h_dam": 20, "h_found": 60, "n_levels": 1, "level_1": 30}
-    run_in_gmsh(project, "dam", coarse | {"dt": -1})
-    rows = (project / "res/dam/quake.txt").read_text().splitlines()
+    run_in_gmsh(project, name, coarse | {"dt": -1})
+    rows = (project / f"res/{name}/quake.txt").read_text().splitlines()
     assert [float(row.split()[7]) for row in rows[1:]] == pytest.approx([0.06 / steps] * steps)
-    assert (project / "res/dam/after.txt").read_text().strip() == "1"
+    assert (project / f"res/{name}/after.txt").read_text().strip() == "1"
 
 
-def test_an_earthquake_of_a_geometry_of_its_own_is_refused(project):
-    """The engine has it for parametric sections."""
-    path = project / "stepped.pro"
+def test_an_earthquake_of_a_solid_geometry_of_its_own_is_refused(project):
+    """The engine has it for parametric sections, and in 2D."""
+    path = project / "valley.pro"
     path.write_text(
         "record_x() = {0, 0, 0.01, 0.2}; record_y() = {0, 0, 0.01, 0};\n" + path.read_text()
     )

@@ -13,12 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import RunError, require
+from ... import ROUND_OFF, InputError, RunError, require
 from ...arrays import Table, Value
 from ...dynamics.record import Record
 from ...dynamics.stepper import Damping
 from ...input.case import Case
 from ...mesh.mesh import mesh_of
+from ...model.network import with_paths
 from ...model.results import Results, column_of, quake_columns
 from . import process, tables
 from .solve import check as check_static
@@ -61,8 +62,8 @@ def check(case: Case) -> None:
     mode, quake = case["quake_uplift"], "for an earthquake with engine = getdp"
     rule = "be crack, unchanged or zero with engine = getdp"
     require(mode != "transient", "quake_uplift", mode, rule)
-    by_parameters = f"be a section by parameters {quake}"
-    require(not case.geometry, "geometry", str(case.geometry), by_parameters)
+    plane = f"be one in 2D, or a section by parameters {quake}"
+    require(not case.geometry or case["dim"] == 2, "geometry", str(case.geometry), plane)
     for name, needed in NEEDED.items():
         allowed = needed if isinstance(needed, str) else f"{needed:g}"
         require(case[name] == needed, name, case[name], f"be {allowed} {quake}")
@@ -73,11 +74,19 @@ def solve(
 ) -> GetdpQuake:
     """The earthquake of a case; GetDP works in a temporary folder.
 
-    dt: longest time step [s]; on_step: is called with the time of each time step.
+    dt: longest time step [s]; on_step: is called with the time of each time step. Raises
+    InputError if a joint is not straight.
     """
     mesh = mesh_of(case)
     check_sizes(case, mesh)
     case = case.with_joints([joint.of_case for joint in mesh.joints])
+    if case.geometry:
+        case = with_paths(case, mesh.joints)
+        for joint, of_mesh in zip(case.joints, mesh.joints, strict=True):
+            straight = joint.joint_along <= (1 + ROUND_OFF) * joint.joint_length
+            rule = f"joint {of_mesh.name} must be straight for an earthquake with engine = getdp"
+            if not straight:
+                raise InputError(f"geometry = {case.geometry}: {rule}")
     options = {"views": 0.0, "fields": 0.0, "damping_a0": damping.a0, "damping_a1": damping.a1}
     lists = {
         f"record_{axis}": np.column_stack([record.times, column]).ravel().tolist()
