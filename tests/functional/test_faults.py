@@ -3,6 +3,7 @@
 import argparse
 import contextlib
 import fcntl
+import hashlib
 import json
 import os
 import resource
@@ -19,6 +20,7 @@ from damjoint import RunError
 from damjoint.csr import CsrMatrix
 from damjoint.engines import engine_of
 from damjoint.fem import factor, memory
+from damjoint.input.parameters import interruptible, start_gmsh
 from damjoint.processes import ProcessKilled, pool_of
 from damjoint.storage import atomic_write, locked_folder
 from PIL import Image
@@ -59,6 +61,25 @@ def test_sigterm_ends_a_run_as_ctrl_c_does(tmp_path):
     assert not any((tmp_path / "tmp").iterdir())
     with pytest.raises(ProcessLookupError):
         os.killpg(process.pid, 0)
+
+
+def test_an_interrupt_does_not_wait_for_a_long_mesh():
+    """Nor is Gmsh used again before it is made."""
+    made, handler = [], signal.signal(signal.SIGALRM, signal.default_int_handler)
+
+    def long_mesh():
+        hashlib.pbkdf2_hmac("sha256", b"", b"", 600_000)  # in C: no signal is handled in it
+        made.append(True)
+
+    signal.setitimer(signal.ITIMER_REAL, 0.05)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            interruptible(long_mesh)
+    finally:
+        signal.signal(signal.SIGALRM, handler)
+    assert not made
+    start_gmsh()
+    assert made
 
 
 @pytest.mark.parametrize("words", [RUN, ("critical", "c"), ("check", "c"), ("plot", "out/c")])

@@ -9,7 +9,8 @@ import re
 import signal
 import threading
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -54,6 +55,8 @@ CACHED = 10
 #: Texts of which it keeps the variables: those of one window, search or report.
 KEPT = 50
 COUNTER = itertools.count()
+#: Long calls of Gmsh that an interrupt has left, see `interruptible`.
+UNFINISHED = set[Future[Any]]()
 
 
 def start_gmsh() -> ModuleType:
@@ -63,6 +66,7 @@ def start_gmsh() -> ModuleType:
     """
     import gmsh
 
+    wait(UNFINISHED)
     if not gmsh.isInitialized():
         numbers = signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE
         handlers = {n: signal.getsignal(n) for n in numbers}
@@ -72,6 +76,18 @@ def start_gmsh() -> ModuleType:
                 signal.signal(number, handler)
         gmsh.option.setNumber("General.Verbosity", 0)  # errors are raised instead
     return gmsh
+
+
+def interruptible(call: Callable[..., Any], *arguments: Any) -> None:
+    """A long call of Gmsh in a thread of its own: Python handles a signal between two calls only.
+    After an interrupt it goes on, and the next use of Gmsh waits for its end.
+    """
+    executor = ThreadPoolExecutor(1)
+    future = executor.submit(call, *arguments)
+    executor.shutdown(wait=False)
+    UNFINISHED.add(future)
+    future.add_done_callback(UNFINISHED.discard)
+    future.result()
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,14 @@ import numpy as np
 from ..arrays import Setting
 from ..input.case import Case
 from ..input.geometry_file import opened
-from ..input.parameters import AUTOMATIC, assignments, declared, listing, start_gmsh
+from ..input.parameters import (
+    AUTOMATIC,
+    assignments,
+    declared,
+    interruptible,
+    listing,
+    start_gmsh,
+)
 from ..input.values import has_drains, has_point
 
 #: Parameters that the mesh always depends on.
@@ -100,7 +107,7 @@ def generate(case: Case) -> None:
     )
     with opened(geometry, settings):
         if not len(gmsh.model.mesh.getElements(int(case["dim"]))[0]):
-            gmsh.model.mesh.generate(int(case["dim"]))
+            interruptible(gmsh.model.mesh.generate, int(case["dim"]))
     if large:
         gmsh.model.mesh.affineTransform(np.pad(THOUSAND * np.eye(3), [(0, 0), (0, 1)]).ravel())
     if geometry:
