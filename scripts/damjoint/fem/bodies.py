@@ -153,8 +153,6 @@ class Bodies:
         start = time.perf_counter()
         by_name = {name: ElasticBody.of(case, mesh, name) for name in mesh.solids}
         measured = (POINT,) * (POINT in mesh.bodies)
-        if case["drive"] == "dissipation":  # needs the work of this load
-            measured += (case["drive_load"],)
         seconds = time.perf_counter() - start
         return Bodies(mesh=mesh, by_name=by_name, seconds=seconds, measured=measured)
 

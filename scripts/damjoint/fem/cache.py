@@ -54,7 +54,7 @@ def key_of(case: Case) -> tuple[object, ...]:
         under_water = case.reached, max(case.tail_levels), case["floor_water"], overtopped(case)
     thermal = thermal_strains(case, COMPLETE)
     needed = *(case[n] for n in PARAMETERS), *under_water, *thermal
-    return shape, *needed, *((case["drive_load"],) if case["drive"] == "dissipation" else ())
+    return shape, *needed
 
 
 @lru_cache(maxsize=1)

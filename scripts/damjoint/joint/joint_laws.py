@@ -97,6 +97,17 @@ class JointLaws:
 
     # -- response
 
+    def unloading_compliance(self, variables: JointVariables) -> Array:
+        """`Law.unloading_compliance` of all points (q, 3)."""
+        compliances = [law.unloading_compliance for law in self.laws]
+        return np.repeat(compliances, np.diff(variables.starts), axis=0)
+
+    def released_jump(self, variables: JointVariables) -> Array:
+        """See `Law`."""
+        numbers = np.diff(variables.starts).tolist()
+        parts = zip(self.laws, variables.joints, numbers, strict=True)
+        return np.concatenate([law.released_jump(state, n) for law, state, n in parts])
+
     def undamaged_tangent(self, points: Sequence[int]) -> Array:
         """Tangent (q, 3, 3) of undamaged joints with these numbers of points."""
         one = (

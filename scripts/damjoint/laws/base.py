@@ -119,6 +119,14 @@ class Law(Generic[V]):
         """This law with the damage frozen that it has at a jump; here itself."""
         return self
 
+    #: compliance [m/Pa] by which the traction along normal, tangent 1, 2 unloads from a plastic
+    #: jump; 0: it unloads to the origin
+    unloading_compliance: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def released_jump(self, variables: V, points: int) -> Array:
+        """The origin (q, 3) to which tractions without a plastic jump unload [m]."""
+        return np.zeros((points, 3))
+
     def release_side(self, jump: Array, variables: V) -> NDArray[np.int_]:
         """Where a point is: before the release of its shear (-1), in it (0), beyond it (1)."""
         return np.zeros(len(jump), int)

@@ -54,6 +54,7 @@ class Bond(SofteningLaw[BondVariables]):
         self.variable_names = ("D" if self.curve.name == "linear" else "xi", "slip_1", "slip_2")
         self.broken_damage = float(self.curve.damage(np.float64(1)))
         self.K_N, self.K_T = p["K_N"], p["K_T"]
+        self.unloading_compliance = 0.0, 1 / self.K_T, 1 / self.K_T
         self.artificial, self.yield_tolerance = p["artificial"], p["yield_tolerance"]
         self.tensile_strength, self.cohesion, self.mu = p["sigma_max"], p["adhesion"], p["mu"]
         self.delta_e = self.tensile_strength / self.K_N

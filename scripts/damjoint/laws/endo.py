@@ -93,6 +93,7 @@ class Endo(SofteningLaw[EndoVariables]):
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         p = parameters
         self.K = np.array([p["K_N"], p["K_T"], p["K_T"]])
+        self.unloading_compliance = 1 / p["K_N"], 1 / p["K_T"], 1 / p["K_T"]
         self.tensile_strength, self.cohesion, self.mu = p["sigma_max"], p["adhesion"], p["mu"]
         self.energy, self.artificial = p["G_f"], p["artificial"]
         self.delta_c = 2 * self.energy / self.tensile_strength

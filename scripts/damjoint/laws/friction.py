@@ -62,6 +62,7 @@ class Friction(Law[FrictionVariables]):
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         p = parameters
         self.K_N, self.K_T, self.H = p["K_N"], p["K_T"], p["pena_tang"]
+        self.unloading_compliance = 0.0, 1 / self.K_T, 1 / self.K_T
         self.mu, self.adhesion = p["mu"], p["adhesion"]
         self.artificial, self.yield_tolerance = p["artificial"], p["yield_tolerance"]
         self.hardens = bool(self.H)

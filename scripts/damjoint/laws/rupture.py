@@ -103,6 +103,10 @@ class Rupture(SofteningLaw[RuptureVariables]):
 
     # -- response
 
+    def released_jump(self, variables: RuptureVariables, points: int) -> Array:
+        """See `Law`."""
+        return np.column_stack([np.zeros(points), variables.released])
+
     def gap(self, jump: Array, variables: RuptureVariables) -> Array:
         """The opening beyond what grout and saw leave, before grout enters (q,) [m]."""
         return np.asarray(jump[:, 0] - self.added_thickness(variables, len(jump)))

@@ -12,6 +12,7 @@ from ..arrays import Array
 from ..input.case import Case
 from ..input.scene import POINT
 from ..joint.equilibrium import Equilibrium
+from ..joint.joint_laws import JointVariables
 from ..model.loads import LEVEL, Loading, Unknown
 from .state import State
 
@@ -32,10 +33,10 @@ class DisplacementControl:
 
     def measure(self, equilibrium: Equilibrium, jump: Array, loading: Loading) -> float:
         """The displacement [m] that is prescribed, at a jump (j,)."""
-        return float(self.gradient(equilibrium) @ jump)
+        return float(self.gradient(equilibrium, jump) @ jump)
 
-    def gradient(self, equilibrium: Equilibrium) -> Array:
-        """Its derivative with the jump (j,)."""
+    def gradient(self, equilibrium: Equilibrium, jump: Array) -> Array:
+        """Its derivative with the jump (j,), at a jump (j,)."""
         raise NotImplementedError
 
     def rate(self, equilibrium: Equilibrium, loading: Loading) -> float:
@@ -61,7 +62,7 @@ class BodyControl(DisplacementControl):
         """See `DisplacementControl`."""
         return equilibrium.displacement(self.name, jump, loading)
 
-    def gradient(self, equilibrium: Equilibrium) -> Array:
+    def gradient(self, equilibrium: Equilibrium, jump: Array) -> Array:
         """See `DisplacementControl`."""
         return equilibrium.bulk.measures[self.name].jump
 
@@ -74,7 +75,7 @@ class BodyControl(DisplacementControl):
 class HeelControl(DisplacementControl):
     """The opening of the heel of the first joint."""
 
-    def gradient(self, equilibrium: Equilibrium) -> Array:
+    def gradient(self, equilibrium: Equilibrium, jump: Array) -> Array:
         """See `DisplacementControl`."""
         return equilibrium.interface.joints[0].heel
 
@@ -85,62 +86,77 @@ class DirectionControl(DisplacementControl):
 
     direction: Array
 
-    def gradient(self, equilibrium: Equilibrium) -> Array:
+    def gradient(self, equilibrium: Equilibrium, jump: Array) -> Array:
         """See `DisplacementControl`."""
         return self.direction
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class DissipationControl(DisplacementControl):
-    """The energy that is dissipated in a step [N m per m of thickness], with a small part of the
-    work of the load of unknown factor, by which it grows where nothing breaks, too: the area that
-    the path of factor lambda and work U of the load of factor 1 sweeps about (U, -shift),
-    ((lambda_0 + shift) U - (lambda + shift) U_0) / 2, from lambda_0, U_0 at the step's beginning
-    [Gutierrez 2004; Verhoosel, Remmers, Gutierrez 2009]. Exact where unloading goes to U = 0.
+    """The energy that the joints dissipate in a step [N m per m of thickness]: the work of their
+    tractions, by the mean of those at its ends, less what they give back when they unload
+    [Gutierrez 2004; Verhoosel, Remmers, Gutierrez 2009]. To it comes a small part that grows with
+    what is unknown, by which the path goes on where nothing breaks, too.
     """
 
-    #: lambda_0 + shift, U_0, and U before the control began
-    factor: float = 0.0
-    work: float = 0.0
-    begun: float = 0.0
-    shift: float = 0.0
+    #: the internal variables and the jump (j,) at the step's beginning
+    variables: JointVariables
+    begin: Array
+    #: what is unknown there, and the part of it in the energy [N m per m over its unit]
+    begun: float
+    shift: float
+    #: what the residual is measured by [N]
+    reference: float
 
     def measure(self, equilibrium: Equilibrium, jump: Array, loading: Loading) -> float:
         """See `DisplacementControl`."""
-        work = work_of(equilibrium, jump, loading) - self.begun
-        return (self.factor * work - (self.unknown.of(loading) + self.shift) * self.work) / 2
+        (before, t0, _), (now, t, _) = self.ends(equilibrium, jump)
+        compliance, plastic = self.unloading(equilibrium)
+        energy = t0 * (now - plastic * before + compliance * t0)
+        energy -= t * (before - plastic * now + compliance * t)
+        joints = equilibrium.interface
+        swept = joints.weights @ energy.sum(axis=1) / 2 / joints.joints[0].width
+        return float(swept + self.shift * (self.unknown.of(loading) - self.begun))
 
-    def gradient(self, equilibrium: Equilibrium) -> Array:
+    def gradient(self, equilibrium: Equilibrium, jump: Array) -> Array:
         """See `DisplacementControl`."""
-        row = sum(
-            size * equilibrium.bulk.measures[name].jump for name, size in load_of(equilibrium)
-        )
-        return np.asarray(self.factor / 2 * row)
+        (before, t0, _), (now, t, tangent) = self.ends(equilibrium, jump)
+        compliance, plastic = self.unloading(equilibrium)
+        by_traction = before - plastic * now + 2 * compliance * t
+        pressed = (plastic[:, 0] == 0)[:, None] & (np.column_stack([now[:, 0], t[:, 0]]) <= 0)
+        t0[pressed[:, 0], 0] = by_traction[pressed[:, 1], 0] = 0
+        rate = t0 + plastic * t - np.einsum("qji,qj->qi", tangent, by_traction)
+        joints = equilibrium.interface
+        return np.asarray(joints.forces(rate) / 2 / joints.joints[0].width)
 
     def rate(self, equilibrium: Equilibrium, loading: Loading) -> float:
         """See `DisplacementControl`."""
-        by_load = sum(
-            size * equilibrium.displacement_rate(name, loading, self.unknown)
-            for name, size in load_of(equilibrium)
-        )
-        return (self.factor * by_load - self.work) / 2
+        return self.shift
 
     def stiffness(self, equilibrium: Equilibrium) -> float:
         """See `DisplacementControl`."""
-        return float(np.linalg.norm(self.gradient(equilibrium))) / abs(self.value)
+        return self.reference / abs(self.value)
 
+    def ends(self, equilibrium: Equilibrium, jump: Array) -> list[tuple[Array, Array, Array]]:
+        """Jumps (q, 3) of the points less what has been released, tractions (q, 3) and tangents
+        (q, 3, 3), at the step's beginning and at a jump (j,); without contact, which is elastic.
+        """
+        laws, interface = equilibrium.laws, equilibrium.interface
+        jumps = [interface.jumps(interface.at_points, end) for end in (self.begin, jump)]
+        released = laws.released_jump(self.variables)
+        ends = [(at - released, *laws.evaluate(at, self.variables)) for at in jumps]
+        to_origin = self.unloading(equilibrium)[1][:, 0] == 0
+        for at, traction, _ in ends:
+            at[to_origin, 0] = np.maximum(at[to_origin, 0], 0)
+            traction[to_origin, 0] = np.maximum(traction[to_origin, 0], 0)
+        return ends
 
-def load_of(equilibrium: Equilibrium) -> list[tuple[str, float]]:
-    """The components of the load of unknown factor, as unit loads, and their sizes."""
-    load = equilibrium.case["drive_load"]
-    return [(f"{load}_{axis}", equilibrium.case[f"{load}_{axis}"]) for axis in "xy"]
-
-
-def work_of(equilibrium: Equilibrium, jump: Array, loading: Loading) -> float:
-    """The work of the load of unknown factor, for the factor 1 [N m per m of thickness]."""
-    return sum(
-        size * equilibrium.displacement(name, jump, loading) for name, size in load_of(equilibrium)
-    )
+    def unloading(self, equilibrium: Equilibrium) -> tuple[Array, Array]:
+        """The compliance (q, 3) of elastic unloading from a plastic jump [m/Pa], and whether
+        (1, 0) there is one along this axis: else tractions unload to the origin.
+        """
+        compliance = equilibrium.laws.unloading_compliance(self.variables)
+        return compliance, (compliance > 0).astype(float)
 
 
 Control = LevelControl | DisplacementControl
@@ -152,7 +168,7 @@ class Prescribed:
     def __init__(self, control: DisplacementControl, equilibrium: Equilibrium) -> None:
         self.control, self.equilibrium = control, equilibrium
         self.stiffness = control.stiffness(equilibrium)
-        self.row, self.unknown = control.gradient(equilibrium), control.unknown
+        self.unknown = control.unknown
         #: the values that are looked for
         self.between = -np.inf, np.inf
         if self.unknown == LEVEL:
@@ -161,6 +177,10 @@ class Prescribed:
     def gap(self, jump: Array, loading: Loading) -> float:
         """See `Constraint`."""
         return self.control.value - self.control.measure(self.equilibrium, jump, loading)
+
+    def row(self, jump: Array) -> Array:
+        """See `Constraint`."""
+        return self.control.gradient(self.equilibrium, jump)
 
     def rate(self, loading: Loading) -> float:
         """See `Constraint`."""

@@ -493,7 +493,8 @@ class SidesInStep:
         if self.control:
             given = Prescribed(self.control, model.equilibrium)
             slope = here.by_unknown(self.unknown)
-            border = Border(slope, given.row, given.rate(self.end.loading), 0.0)
+            row = given.row(self.end.jump)
+            border = Border(slope, row, given.rate(self.end.loading), 0.0)
         self.linear = Linearised(problem, here.by_jump(False), border)
         #: of the parameters: rates of the jump and of what is unknown beside it
         self.rate = np.zeros((sides.number, len(self.end.jump)))

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..input.case import Case
 from ..joint.interface import Interface
-from ..model.loads import Loading, Unknown
+from ..model.loads import LEVEL, Loading, Unknown
 from ..model.results import Info, Results
-from .controls import Control, DissipationControl, LevelControl, drive_of, work_of
+from .controls import Control, DissipationControl, LevelControl, drive_of
 from .history import History
 from .model import Model, StepOptions, StepResult
 from .path import PRECISION, ROUGH, SURE, EquilibriumPath, Point
@@ -123,7 +123,7 @@ class LoadStepper:
             return LevelControl(level)
         share = (time - begin) / (end - begin)
         if case["drive"] == "dissipation":
-            return self.dissipation(case["drive_energy"] * (time - self.state.time) / (end - begin))
+            return self.dissipation(time)
         return drive_of(case, self.displacement_at_begin + case["drive_by"] * share)
 
     def run(self) -> Results:
@@ -164,23 +164,22 @@ class LoadStepper:
         return step
 
     def controlled_displacement(self) -> float:
-        """The displacement that the case prescribes, in the last state [m]; under dissipation
-        control the work of the load of factor 1 [N m per m].
-        """
-        if self.case["drive"] == "dissipation":
-            return work_of(self.model.equilibrium, self.state.jump, self.state.loading)
+        """The displacement that the case prescribes, in the last state [m]."""
         return self.model.measure(drive_of(self.case), self.state)
 
-    def dissipation(self, energy: float) -> DissipationControl:
-        """The control of an energy [N m per m] from the last state on."""
-        unknown, shift = Unknown(self.case["drive_load"]), self.case.shared["dissipation_shift"][0]
+    def dissipation(self, time: float) -> DissipationControl:
+        """The control of the energy that is dissipated from the last state to a time."""
+        case, state, unknown = self.case, self.state, Unknown(self.case["drive_load"])
+        energy, duration = case["drive_energy"], case["drive_end"] - case["drive_begin"]
+        unit = case.size if unknown == LEVEL else 1.0
         return DissipationControl(
-            energy,
+            energy * (time - state.time) / duration,
             unknown=unknown,
-            factor=unknown.of(self.state.loading) + shift,
-            work=self.controlled_displacement() - self.displacement_at_begin,
-            begun=self.displacement_at_begin,
-            shift=shift,
+            variables=self.model.begin(state, time).start.variables,
+            begin=state.jump,
+            begun=unknown.of(state.loading),
+            shift=case.shared["dissipation_shift"][0] * energy / unit,
+            reference=self.model.reference,
         )
 
     def accept(self, step: StepResult, cuts: int) -> None:

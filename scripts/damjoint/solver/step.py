@@ -22,13 +22,16 @@ class Constraint(Protocol):
 
     #: [N/m]; weight of its gap in the norm of the residual
     stiffness: float
-    #: its derivative with the jump (j,); what is unknown, and between which values
-    row: Array
+    #: what is unknown, and between which values
     unknown: Unknown
     between: tuple[float, float]
 
     def gap(self, jump: Array, loading: Loading) -> float:
         """What is missing at a jump (j,) [m]."""
+        ...
+
+    def row(self, jump: Array) -> Array:
+        """Its derivative with the jump (j,)."""
         ...
 
     def rate(self, loading: Loading) -> float:
@@ -120,7 +123,8 @@ def solve_from(
             border = None
             if constraint:
                 rate = constraint.rate(here)
-                border = Border(residual.by_unknown(unknown), constraint.row, rate, gap)
+                row = constraint.row(jump)
+                border = Border(residual.by_unknown(unknown), row, rate, gap)
             return problem.system.solve(residual.by_jump(secant), -residual.value, border)
 
         return Iterate(jump, level, residual.value, size, correction, side)
