@@ -325,9 +325,8 @@ class Differentiation:
                 offsets.append(end[side] - middle[len(offsets) % len(names)])
         self.offsets = np.array(offsets)
         self.number, self.distance = len(ends), np.array([high - low for _, low, high in ends])
-        start = model.start()
         #: of the sides, if each is evaluated apart; displacement of the crest from which it counts
-        self.states = [start] * (2 * self.number)
+        self.states = [side.start() for side in self.models] if self.apart else []
         self.crest_at_rest = np.zeros(2 * self.number)
         #: of the parameters: whether at a kink, and whether their rates were not found
         self.kink, self.lost = np.zeros((2, self.number), bool)
