@@ -86,6 +86,9 @@ OF_UPLIFTS = {
 }
 #: Uplifts with which the laws that have two soften exponentially.
 EXPONENTIAL = "imposed", "cracked"
+#: A force whose factor is unknown, with an energy that is dissipated.
+DISSIPATION = {"drive": "dissipation", "drive_load": "force", "force_x": 1e6, "force_t": 1}
+DISSIPATION |= {"drive_energy": 10.0, "steps": 1}
 #: Columns that are compared, and their size [m], [N/m], [N]; a derivative is exact to 1e-6, or to
 #: 1e-9 of the size for a relative change of one.
 SIZES = {"crest_ux": 1e-2, "max_opening": 1e-3, "N": 1e7, "T": 1e7, "M": 1e8, "U": 1e7}
@@ -131,6 +134,33 @@ def test_the_results_of_a_run_against_central_differences(law, uplift):
             allowed = OF_SIZE * size / row.value
             got = row.derivatives[column]
             assert got == pytest.approx(expected, rel=EXACT, abs=allowed), (row.name, column)
+
+
+@pytest.mark.parametrize(
+    "driven", [{"drive": "heel"}, {"drive": "crest", "drive_load": "quake", "k_h": 0.1}]
+)
+def test_a_prescribed_displacement_counts_from_a_state_that_has_derivatives(driven):
+    """It did not, so that T had five times its derivative with K_T."""
+    coarse = {"n_joint": 6, "order": 1, "tolerance": 1e-13, "drive_by": 3e-4, "quake_t": 1}
+    weak = {"mu": 1.2, "adhesion": 4e4, "sigma_max": 3e4, "weight_first": 1}
+    case = dj.case("dam", levels=[10, 20], steps=1, **driven, **coarse, **weak)
+    names = "mu", "K_T", "rho_dam", "drive_by"
+    rows = [row for row in sensitivity.of_run(case, names) if row.time == 2]
+    assert [row.name for row in rows] == list(names)
+    assert all(row.derivatives["T"] != 0 for row in rows if row.name != "mu")
+    for row in rows:
+        step = 1e-5 * row.value
+        low, high = (history(dj.case(case, **{row.name: row.value + k * step})) for k in (-1, 1))
+        for column in ("crest_ux", "max_opening", "N", "T", "M"):
+            expected, allowed = (high[column] - low[column]) / (2 * step), SIZES[column] / row.value
+            got = row.derivatives[column]
+            assert got == pytest.approx(expected, rel=EXACT, abs=OF_SIZE * allowed), row.name
+
+
+def test_states_under_control_of_the_dissipation_have_no_derivative():
+    case = dj.case("dam", levels=[20, 20], n_joint=4, order=1, **DISSIPATION)
+    with pytest.raises(dj.RunError, match="dissipation control, or after drive_end, has no deriv"):
+        sensitivity.of_run(case, ["mu"])
 
 
 #: Half of a difference of runs over the value of a parameter, and change of the derivative beyond
@@ -287,11 +317,13 @@ def test_a_kink_is_said_and_its_derivative_is_that_for_a_larger_value():
 def test_the_geometry_by_two_runs():
     """The resultants are linear in the width of the base, without a crack."""
     case = dj.case("dam", levels=[20, 30], n_joint=10)
+    (alone,) = sensitivity.of_run(dj.case(case, levels=[30]), ["dam_base"])
     rows = sensitivity.of_run(case, sensitivity.names_of(case, "mu,dam_base", geometry=True))
     of_mu, of_base = (
         next(r for r in rows if (r.name, r.level) == (n, 30)) for n in ("mu", "dam_base")
     )
     assert of_base.of_runs and not of_mu.of_runs
+    assert alone.derivatives["N"] == pytest.approx(of_base.derivatives["N"], rel=1e-9)
     assert of_base.derivatives["N"] == pytest.approx(
         2400 * 9.81 * 45 / 2 - WATER * 30 / 2, rel=1e-6
     )

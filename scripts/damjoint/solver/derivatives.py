@@ -44,8 +44,9 @@ from ..laws import Law
 from ..mesh.generate import MARKS
 from ..model.loads import LEVEL, Loading
 from ..model.results import column_of, history_table
-from .controls import DisplacementControl, Prescribed
+from .controls import BodyControl, DisplacementControl, Prescribed, drive_of
 from .history import History, JointState
+from .load_stepper import SAME_TIME
 from .model import Begun, Model, StepResult
 from .state import State, Trace
 
@@ -74,8 +75,9 @@ OF_LOADS = "rho_dam", "rho_found"
 MODULI = "E", "E_dam", "E_found"
 LOADING = "rho_dam", "rho_water", "g"
 
-#: Groups of parameters on which the mesh or the way to the solution depends.
-NOT_CONTINUOUS = "Mesh", "Solver", "Geometry"
+#: Groups of parameters on which the mesh or the way to the solution depends, and times that decide
+#: in which step a displacement is prescribed.
+NOT_CONTINUOUS, TIMES = ("Mesh", "Solver", "Geometry"), ("drive_begin", "drive_end")
 
 
 @dataclass(frozen=True)
@@ -145,10 +147,10 @@ def half_difference(case: Case, name: str) -> tuple[float, float, float]:
     """
     joint, _, of_joint = name.rpartition(".")
     known = parameter(of_joint)
-    if not known.real or known.group in NOT_CONTINUOUS:
+    if not known.real or known.group in NOT_CONTINUOUS or of_joint in TIMES:
         raise InputError(
             f"--sensitivity {name}: must be a parameter that is a number, and neither of geometry, "
-            "mesh nor solver"
+            f"mesh nor solver, nor {', '.join(TIMES)}"
         )
     names = list(case.joint_names)
     if joint and joint not in names:
@@ -328,6 +330,8 @@ class Differentiation:
         #: of the sides, if each is evaluated apart; displacement of the crest from which it counts
         self.states = [side.start() for side in self.models] if self.apart else []
         self.crest_at_rest = np.zeros(2 * self.number)
+        #: displacement from which the one counts that the case prescribes, of the sides
+        self.drive_from = np.zeros(2 * self.number)
         #: of the parameters: whether at a kink, and whether their rates were not found
         self.kink, self.lost = np.zeros((2, self.number), bool)
         self.joints = [self.alike_at(k) for k in range(len(model.equilibrium.laws.laws))]
@@ -436,10 +440,19 @@ class Differentiation:
         """The derivatives along the updates of a path, of those whose numbers are wanted and of the
         last one, and its `level_rise` at the end; values: of the sides (sides,) at a step's end.
 
-        Raises RunError if an update is a relaxation with frozen damage.
+        Raises RunError if an update is a relaxation with frozen damage, under dissipation control
+        or after the end of a prescribed displacement.
         """
-        state, results = self.model.start(), list[Rates]()
+        state, results, case = self.model.start(), list[Rates](), self.model.case
+        drives = case["drive"] != "level"
         for number, update in enumerate(updates):
+            if drives and (
+                case["drive"] == "dissipation" or update.state.time > case["drive_end"] + SAME_TIME
+            ):
+                raise RunError(
+                    f"sensitivity: drive = {case['drive']}: a state under dissipation control, or "
+                    "after drive_end, has no derivative"
+                )
             if update.frozen:
                 raise RunError(
                     f"sensitivity: the crack has grown unstably at level "
@@ -451,6 +464,8 @@ class Differentiation:
             state = update.state
             if state.time == 0 and self.model.case["weight_first"]:
                 self.crest_at_rest = step.displacement("crest")
+            if drives and state.time < case["drive_begin"] + SAME_TIME:
+                self.drive_from = step.measured(drive_of(case))
             if number in wanted or number == len(updates) - 1:
                 rates = {n: self.rate_of(v) for n, v in values(step).items()}
                 level = np.where(self.lost, np.nan, step.level_rate)
@@ -696,7 +711,25 @@ class SidesInStep:
                     for one, side in zip(of, pair, strict=True)
                 )
                 gaps[k] = (low - high) / self.sides.distance[k]
+        if base.case["drive"] != "level":
+            values = self.sides.drive_from + self.driven
+            gaps += (values[number:] - values[:number]) / self.sides.distance
         return np.asarray(gaps)
+
+    @property
+    def driven(self) -> Array:
+        """What the case adds to the prescribed displacement at the beginning [m], of the sides."""
+        case = self.sides.model.case
+        begin, end = case["drive_begin"], case["drive_end"]
+        whole = np.array([model.case["drive_by"] for model in self.sides.models])
+        return np.asarray(whole * (self.end.time - begin) / (end - begin))
+
+    def measured(self, control: DisplacementControl) -> Array:
+        """A displacement by its control [m], of the sides."""
+        pairs = zip(self.sides.models, self.jumps, strict=True)
+        return np.array(
+            [control.measure(m.equilibrium, d, self.loading(k)) for k, (m, d) in enumerate(pairs)]
+        )
 
     # -- the states of the sides, where the next step begins
 
@@ -741,10 +774,7 @@ class SidesInStep:
 
     def displacement(self, name: str) -> Array:
         """A displacement of the bodies by its name [m]."""
-        pairs = zip(self.sides.models, self.jumps, strict=True)
-        return np.array(
-            [m.equilibrium.displacement(name, d, self.loading(k)) for k, (m, d) in enumerate(pairs)]
-        )
+        return self.measured(BodyControl(0.0, name))
 
     def pressures(self, joint: int) -> list[Pressure]:
         """The water in a joint, by its number."""

@@ -219,7 +219,9 @@ def of_run(case: Case, names: Sequence[str]) -> list[Sensitivity]:
         columns = list(with_all_joints(dict.fromkeys(CONTINUOUS, ("", "")), stepper.case))
         direct = [name for name in names if has_derivative(stepper.case, name)]
         others = [name for name in names if name not in direct]
-        rates, _ = Differentiation(stepper.model, direct).along(updates, ends, values_of_sides)
+        rates = list[Rates]()
+        if direct:
+            rates, _ = Differentiation(stepper.model, direct).along(updates, ends, values_of_sides)
         # near a kink: also those for a larger value, which are others at a kink
         kinks = rates[-1].kink.tolist() if rates else []
         near = [name for name, kink in zip(direct, kinks, strict=False) if kink]
