@@ -101,11 +101,15 @@ class Mutation:
         source = Path(damjoint.__file__).parent
         copy = folder / "scripts" / source.name
         shutil.copytree(source, copy, ignore=shutil.ignore_patterns("__pycache__"))
+        of_data = Path(self.file).parts[0] in DATA
         for name in DATA:
             beside = source.parents[1] / name
             if beside.exists() and not (copy / name).exists():
-                (folder / name).symlink_to(beside)
-        path = copy / self.file
+                if of_data:  # a file of geo/ includes those of pro/ beside it
+                    shutil.copytree(beside, folder / name)
+                else:
+                    (folder / name).symlink_to(beside)
+        path = (folder if of_data and not (copy / self.file).exists() else copy) / self.file
         before = path.read_text()
         if before.count(self.text) != 1:
             raise ValueError(
@@ -344,6 +348,111 @@ MUTATIONS = (
         "water.law.gapes(jump, variables)",
         "water.law.is_open(jump, variables)",
         both(having("quake_uplift", "zero"), having("law", "rupture")),
+        quake=True,
+    ),
+    Mutation(
+        "uniform pressure x 1.02",
+        "joint/equilibrium.py",
+        "pressure = np.full(len(face.y), self.unit_weight * level)",
+        "pressure = np.full(len(face.y), 1.02 * self.unit_weight * level)",
+        having("face_load", "uniform"),
+    ),
+    Mutation(
+        "force of the upstream face on the downstream one",
+        "pro/section.pro",
+        '!StrCmp(force_face, "upstream") ? UP : DOWN;',
+        '!StrCmp(force_face, "upstream") ? DOWN : UP;',
+        having("force_face", "upstream", "downstream"),
+    ),
+    Mutation(
+        "neck_batter x 1.02",
+        "pro/section.pro",
+        "down_x() += crest_x + neck_batter;",
+        "down_x() += crest_x + 1.02 * neck_batter;",
+        having("neck_batter"),
+    ),
+    Mutation(
+        "grouting half a unit of t earlier",
+        "laws/rupture.py",
+        'p["grout_pressure"] / self.K_contact, p["grout_t"]',
+        'p["grout_pressure"] / self.K_contact, p["grout_t"] - 0.5',
+        having("grout_pressure"),
+    ),
+    Mutation(
+        "joint_head_offset dropped",
+        "model/loads.py",
+        'reservoir = level + case["joint_head_offset"]',
+        "reservoir = level",
+        having("joint_head_offset"),
+    ),
+    Mutation(
+        "weight of the rock always in equilibrium",
+        "joint/equilibrium.py",
+        '"foundation_y": 0.0 if case["in_situ"] else',
+        '"foundation_y": 0.0 if True else',
+        both(having("rho_found"), having("in_situ", 0)),
+        fields=True,
+    ),
+    Mutation(
+        "temperature of the rock x 1.1",
+        "model/loads.py",
+        'case["expansion_found"] * case["temperature_found"]',
+        '1.1 * case["expansion_found"] * case["temperature_found"]',
+        having("temperature_found"),
+        fields=True,
+    ),
+    Mutation(
+        "ends fixed along z in any 3D scene",
+        "fem/bodies.py",
+        'if dim == 3 and case["hold_z"]:',
+        "if dim == 3:",
+        both(having("dim"), having("hold_z", 0)),
+        fields=True,
+    ),
+    Mutation(
+        "sign of k_v",
+        "joint/equilibrium.py",
+        '"dam_y": (case["k_v"] * quake - 1) * concrete,',
+        '"dam_y": (-case["k_v"] * quake - 1) * concrete,',
+        having("k_v"),
+    ),
+    Mutation(
+        "G_f of bond x 1.02",
+        "laws/bond.py",
+        'self.delta_c = 2 * p["G_f"] /',
+        'self.delta_c = 2.04 * p["G_f"] /',
+        both(having("law", "bond"), having("sigma_max")),
+    ),
+    Mutation(
+        "sign of the vertical acceleration",
+        "dynamics/record.py",
+        'parts = {"both": (1, 1),',
+        'parts = {"both": (1, -1),',
+        having("record_component", "both"),
+        quake=True,
+    ),
+    Mutation(
+        "damping by the mass of the concrete: with the water",
+        "dynamics/stepper.py",
+        'case["damping_mass"] == WITH_WATER',
+        'case["damping_mass"] != WITHOUT',
+        both(having("damping_mass", 1), having("added_mass")),
+        quake=True,
+    ),
+    Mutation(
+        "tangential dashpots of the joint x 1.1",
+        "dynamics/stepper.py",
+        'normal, tangential = case["joint_damping_n"], case["joint_damping_t"]',
+        'normal, tangential = case["joint_damping_n"], 1.1 * case["joint_damping_t"]',
+        having("joint_damping_t"),
+        quake=True,
+    ),
+    Mutation(
+        "storage in an earthquake x 1.02",
+        "joint/water.py",
+        'stored = self.members[0].case["storage"] * flow.points.weights',
+        'stored = 1.02 * self.members[0].case["storage"] * flow.points.weights',
+        having("quake_uplift", "transient"),
         quake=True,
     ),
 )

@@ -18,9 +18,9 @@ Drawn: TypeAlias = dict[str, Any]
 
 #: Third number of the seed of the lift joints, of temperature, works on the joint, waterstop, law =
 #: endo and variants of loads, of joints that meet, of softening curves, of flow in time, of films,
-#: and of law = mixed, which are drawn apart.
+#: of law = mixed, and of what is seldom asked for, which are drawn apart.
 LIFT_DRAWS, WORKS_DRAWS, NETWORK_DRAWS, CURVE_DRAWS, TIME_DRAWS, FILM_DRAWS = 1, 3, 4, 5, 6, 7
-MIXED_DRAWS = 8
+MIXED_DRAWS, RARE_DRAWS = 8, 9
 #: Parameters that are drawn for each joint, but for the place of its drains.
 OF_JOINTS = (
     *("law", "K_N", "K_T", "sigma_max", "adhesion", "mu", "pena_rupture", "alpha", "pena_tang"),
@@ -130,7 +130,51 @@ def random_scene(seed: int, number: int) -> RandomScene:
     settings = with_curve(settings, RandomNumbers(seed, number, CURVE_DRAWS))
     settings = with_time(settings, RandomNumbers(seed, number, TIME_DRAWS))
     settings = with_film(settings, RandomNumbers(seed, number, FILM_DRAWS))
-    return replace(scene, settings=settings)
+    scene = replace(scene, settings=settings)
+    return with_rare(scene, RandomNumbers(seed, number, RARE_DRAWS))
+
+
+def with_rare(scene: RandomScene, rng: RandomNumbers) -> RandomScene:
+    """Add to some scenes what is seldom asked for: other densities and gravity, weight of the rock,
+    the published quadrature, a contact stiffness; of a section also an inclined neck, a force on
+    any face, a joint above the heel, a later grouting, a uniform pressure on the upstream face.
+    """
+    settings, drawn = scene.settings, Drawn()
+    some = [rng.event(0.2) for _ in range(8)]
+    if some[0]:
+        drawn |= {"g": 9.80665, "rho_dam": rng.uniform(2200, 2600)}
+        drawn["rho_water"] = rng.uniform(990, 1030)
+    if some[1]:
+        drawn |= {"rho_found": rng.uniform(2000, 2800), "in_situ": rng.choice(0, 1)}
+    if some[2]:
+        drawn["nu_found"] = rng.uniform(0, 0.35)
+    if some[3]:
+        drawn["quadrature"] = "published"
+    if some[4] and "rupture" in settings["law"]:
+        drawn["pena_contact"] = rng.choice(2, 5)
+    if scene.base != "dam":
+        return replace(scene, settings=settings | drawn)
+    height, crest, levels = settings["dam_height"], settings["dam_crest"], scene.levels
+    if "neck_height" in settings and rng.event(0.5):
+        widest = settings["dam_base"] - settings.get("batter", 0) - crest
+        drawn["neck_batter"] = float(f"{rng.uniform(0.02, 0.2) * widest:.3g}")
+    if "force_x" in settings or some[5]:
+        size = 5000 * height**2  # the thrust
+        face = rng.choice("upstream", "downstream", "crest")
+        at = rng.uniform(0.3, 0.95) * height if face != "crest" else rng.uniform(0.2, 0.8) * crest
+        up = rng.uniform(-0.03, 0.03) * size
+        drawn |= {"force_face": face, "force_at": float(f"{at:.4g}"), "force_y": round(up)}
+        if settings.get("mesh_pattern") == "regular":
+            drawn["mesh_pattern"] = "free"
+    if "grout_pressure" in settings:
+        drawn["grout_t"] = rng.choice(1, levels.count(",") + 1)
+    if some[6] and set(np.ravel(settings["uplift"])) - {"none"}:
+        drawn["joint_head_offset"] = float(f"{rng.uniform(0.001, 0.03) * height:.3g}")
+    uniform = some[7] and scene.tail_levels == "0"
+    if uniform and not {"silt_height", "k_h"} & settings.keys():
+        drawn["face_load"] = "uniform"  # twice the thrust
+        levels = ",".join(f"{0.6 * float(level):.3g}" for level in levels.split(","))
+    return replace(scene, settings=settings | drawn, levels=levels)
 
 
 def with_mixed(settings: Drawn, rng: RandomNumbers) -> Drawn:

@@ -117,7 +117,8 @@ QUAKES_VERIFIED = """\
   the dashpots of the joint, equal the static loads, the inertia of all that is above the joint, the
   mass of the water included, and the damping by the mass (of concrete and water), to 1e-6 of the
   weight (times the base). Loads and masses by the polygon, dashpots from the jumps. Damping by the
-  stiffness and absorbing boundaries have no resultant there.
+  stiffness and absorbing boundaries have no resultant there: they are not verified here (tests:
+  the decay of a free vibration, waves in a column of rock).
 - *Joint law*: replayed as above, at every node and integration point of every time step.
 - *Water*: the pressure at every node and integration point of every time step, by `quake_uplift`:
   the flow through the openings at the beginning of the step, that of the static state, or none in

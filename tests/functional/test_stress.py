@@ -225,7 +225,10 @@ def test_scenes_have_all_that_is_drawn_and_can_be_loaded():
         assert drawn in words
     assert any("mixed" in np.ravel(scene.settings["law"]) for scene in scenes)
     assert "uplift=waterstop" in words and "quake_uplift=unchanged" in words
-    assert "time_unit" in words
+    for drawn in ("time_unit", "face_load=uniform", "neck_batter", "joint_head_offset"):
+        assert drawn in words
+    for drawn in ("in_situ=0", "quadrature=published", "force_face=upstream"):
+        assert drawn in words
     for number, scene in enumerate(scenes):  # later draws leave the first ones as they were
         single = random_scenes.single_joint_scene(7, number)
         assert len(single.case.joints) == 1
