@@ -2,6 +2,7 @@
 
 import csv
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import damjoint
@@ -25,9 +26,18 @@ def test_there_are_46_mutations_each_of_one_place(tmp_path):
         unknown.make(tmp_path)
 
 
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    """Scenes that are drawn once for all mutations, and the folder of their records."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("random_scene", "random_quake"):
+            patch.setattr(mutations, name, cache(getattr(mutations, name)))
+        yield tmp_path_factory.mktemp("records")
+
+
 @pytest.mark.parametrize("name", BY_NAME)
-def test_there_are_scenes_in_which_a_mutation_matters(name, tmp_path):
-    assert next(scenes_of(BY_NAME[name], 31, tmp_path))
+def test_there_are_scenes_in_which_a_mutation_matters(name, drawn):
+    assert next(scenes_of(BY_NAME[name], 31, drawn))
 
 
 @pytest.mark.parametrize(
