@@ -62,6 +62,24 @@ def test_the_critical_level_of_the_joint_that_fails():
     assert abs(rates["base.mu"]) < 1e-6
 
 
+@pytest.mark.parametrize("beyond", [-1e-7, 1e-7])
+def test_a_kink_of_the_critical_level_where_another_joint_fails(beyond):
+    """Base and lift slide at the same level but for 2 um: the derivatives are those of the one that
+    slides first, in closed form, and a kink is said.
+    """
+    base, by_base, _ = slopes(0.6)
+    tie = brentq(lambda mu: slopes(mu, foot=12.0)[0] - base, 0.3, 0.9, xtol=1e-14)
+    lifts = {**SLIDES, "n_joint": 4, "lift_heights": (12.0,), "lift 12 m.mu": tie + beyond}
+    case = dj.case("dam", levels=[25, 30], mu=0.6, **lifts)
+    answer = Search(replace(case, all_steps=True), "level").find()
+    rows = sensitivity.of_point(answer.point, ["base.mu", "lift 12 m.mu"])
+    assert answer.value == pytest.approx(base, abs=5e-6) and all(row.kink for row in rows)
+    found = [row.derivatives["critical_level"] for row in rows]
+    by_lift = slopes(tie, foot=12.0)[1]
+    expected = (by_base, 0.0) if beyond > 0 else (0.0, by_lift)
+    assert found == pytest.approx(expected, rel=1e-5, abs=1e-6)
+
+
 def history(case):
     """The last row of history.csv of a run, with safety factors and the end of the crack."""
     stepper = LoadStepper(case)
