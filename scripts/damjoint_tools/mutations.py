@@ -432,14 +432,6 @@ MUTATIONS = (
         quake=True,
     ),
     Mutation(
-        "damping by the mass of the concrete: with the water",
-        "dynamics/stepper.py",
-        'case["damping_mass"] == WITH_WATER',
-        'case["damping_mass"] != WITHOUT',
-        both(having("damping_mass", 1), having("added_mass")),
-        quake=True,
-    ),
-    Mutation(
         "tangential dashpots of the joint x 1.1",
         "dynamics/stepper.py",
         'normal, tangential = case["joint_damping_n"], case["joint_damping_t"]',

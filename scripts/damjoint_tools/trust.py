@@ -118,7 +118,9 @@ QUAKES_VERIFIED = """\
   mass of the water included, and the damping by the mass (of concrete and water), to 1e-6 of the
   weight (times the base). Loads and masses by the polygon, dashpots from the jumps. Damping by the
   stiffness and absorbing boundaries have no resultant there: they are not verified here (tests:
-  the decay of a free vibration, waves in a column of rock).
+  the decay of a free vibration, waves in a column of rock). Nor is the balance with
+  `damping_mass = 1` beside added mass, as the velocity of the concrete without the water is in no
+  table: that mass of the water in the damping by mistake would not be noticed.
 - *Joint law*: replayed as above, at every node and integration point of every time step.
 - *Water*: the pressure at every node and integration point of every time step, by `quake_uplift`:
   the flow through the openings at the beginning of the step, that of the static state, or none in
