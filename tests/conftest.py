@@ -2,12 +2,15 @@
 
 import gc
 import signal
+from contextlib import contextmanager
 
+import numpy as np
 import pytest
 from damjoint import runner
 from damjoint.input.resolve import load
 from damjoint.pictures import drawing, run_picture
 from damjoint.threads import limited_threads
+from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 
@@ -62,6 +65,59 @@ def solve(tmp_path_factory):
         return done[key]
 
     return once
+
+
+def blank_pixels(figure, dpi):
+    """Grey pixels of the size of a figure."""
+    width, height = (round(dpi * inches) for inches in figure.get_size_inches())
+    return np.full((height, width, 4), 128, np.uint8)
+
+
+def blank_file(figure, file, **options):
+    """A figure as an empty SVG; in another format as it is."""
+    if options.get("format") != "svg":
+        return PAINTERS[Figure, "savefig"](figure, file, **options)
+    return file.write(b'<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"/>')
+
+
+#: What paints pictures, and what does not.
+BLANK = {
+    (drawing, "pixels_of"): blank_pixels,
+    (run_picture, "pixels_of"): blank_pixels,
+    (Figure, "savefig"): blank_file,
+}
+PAINTERS = {place: getattr(*place) for place in BLANK}
+
+
+@contextmanager
+def painted_by(painters):
+    """Pictures are painted so in this context."""
+    with pytest.MonkeyPatch.context() as patch:
+        for place, painter in painters.items():
+            patch.setattr(*place, painter)
+        yield
+
+
+@pytest.fixture(scope="module", autouse=True)
+def blank_pictures():
+    """Pictures are composed and written but not painted, which takes longer than a small scene;
+    a test that looks at them uses `painted`.
+    """
+    with painted_by(BLANK):
+        yield
+
+
+@pytest.fixture(scope="session")
+def painting():
+    """Pictures are painted in the context painting()."""
+    return lambda: painted_by(PAINTERS)
+
+
+@pytest.fixture
+def painted(painting):
+    """Pictures are painted."""
+    with painting():
+        yield
 
 
 @pytest.fixture

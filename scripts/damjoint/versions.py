@@ -58,6 +58,7 @@ def peak_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
+@lru_cache
 def installed(name: str) -> str:
     """Return the version of a package; empty if it is not installed."""
     try:

@@ -496,7 +496,7 @@ def test_only_the_joint_that_fails_fails(solve):
     assert not [line for line in lines if "lift 15 m, finite elements: fails" in line]
 
 
-def test_picture_of_each_joint_of_a_dam_that_fails(solve, tmp_path):
+def test_picture_of_each_joint_of_a_dam_that_fails(solve, painted, tmp_path):
     """Also of a joint that does not fail."""
     weak = {"law": "bond", "mu": 0.3, "adhesion": 1e5, "lift_heights": (15.0,)}
     (result,) = solve("dam", (45.0,), n_joint=24.0, order=1.0, **weak)

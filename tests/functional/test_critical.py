@@ -28,6 +28,7 @@ from damjoint.studies import failure_path
 from damjoint.studies.critical import Search
 from damjoint.studies.critical_study import critical, printed_lines, table
 from damjoint.studies.failure_path import FailurePath
+from variants import further
 
 #: A dam of 45 m on a mesh that is fine enough for limits of the rigid block.
 DAM = {"E_dam": 2e10, "E_found": 3e10, "n_joint": 20.0}
@@ -73,7 +74,7 @@ def test_overturning_level(wet):
 
 
 @pytest.mark.parametrize(
-    "mu, levels, tails", [(0.6, None, "3"), (0.7, None, "3"), (0.7, "30,40", "0,3")]
+    "mu, levels, tails", further(1, [(0.6, None, "3"), (0.7, None, "3"), (0.7, "30,40", "0,3")])
 )
 def test_sliding_level_without_cohesion(mu, levels, tails):
     """Linear uplift, and a tailwater of 3 m that rises or is constant."""
@@ -700,6 +701,7 @@ def test_a_path_begins_as_a_run_where_single_steps_do_not_lead(monkeypatch):
     assert not answer.confirmed and "falls from the first equilibrium on, at 20 m" in answer.doubt
 
 
+@pytest.mark.heavy
 def test_a_highest_level_that_depends_on_the_increments_is_not_confirmed(monkeypatch):
     def differs(self):
         self.interval = 48.0, 49.0
@@ -769,7 +771,8 @@ def test_the_first_unstable_growth_of_a_law_without_friction_is_the_critical_lev
     assert answer.value < min(row.after.values()) <= max(answer.after.values())
 
 
-@pytest.mark.parametrize("engine", ["condensed", pytest.param("getdp", marks=pytest.mark.heavy)])
+@pytest.mark.heavy
+@pytest.mark.parametrize("engine", ["condensed", "getdp"])
 def test_the_crack_grows_unstably_under_a_level_above_the_critical_one(engine, tmp_path):
     """Modeling K, level by level: no crack just below it, two elements at once just above it."""
     _, answer = search_result("k")

@@ -11,6 +11,7 @@ from damjoint.input.case import Case
 from damjoint.input.resolve import load
 from damjoint.laws import LAWS
 from damjoint.model.results import JOINT, Results
+from variants import further
 
 
 def random_path(law_name: str, seed: int, case: Case) -> np.ndarray:
@@ -314,9 +315,7 @@ HEAVY = {
 }
 
 
-@pytest.mark.parametrize(
-    "scene", [*SEVERAL, *(pytest.param(name, marks=pytest.mark.heavy) for name in HEAVY)]
-)
+@pytest.mark.parametrize("scene", further(2, SEVERAL | HEAVY))
 def test_runs_of_both_engines_agree_on_several_joints(scene, tmp_path):
     name, settings, levels, tails = (SEVERAL | HEAVY)[scene]
     (result,) = agree(load(name, {"tolerance": 1e-10} | settings, levels, tails), tmp_path)
@@ -394,25 +393,25 @@ BLOCK_JOINTS = {
 }
 #: Uplift of these joints, and other settings.
 NETWORKS = {
+    "mixed": (("flow", "imposed", "cracked"), {}),
+    "drained, driven": (
+        ("imposed", "drained", "none"),
+        {"drain_x": 1.0, "drive": "crest", "drive_by": 5e-4},
+    ),
     "apertures in series": (("flow", "flow", "none"), {"K_N": (1e12, 2e12, 1e12)}),
     "three joints": (("flow", "flow", "flow"), {}),
     "cracked": (("cracked", "cracked", "cracked"), {}),
     "imposed": (("imposed", "imposed", "imposed"), {}),
-    "mixed": (("flow", "imposed", "cracked"), {}),
     "up to a waterstop": (("waterstop", "flow", "none"), {"waterstop": 2.0}),
     "waterstop behind a joint": (("flow", "waterstop", "none"), {"waterstop": 2.3}),
     "imposed up to a waterstop": (("imposed", "waterstop", "imposed"), {"waterstop": 2.3}),
     "up to a dry joint": (("imposed", "none", "imposed"), {}),
     "drained": (("drained", "drained", "none"), {"drain_x": (3.0, 1.0, 1.0)}),
-    "drained, driven": (
-        ("imposed", "drained", "none"),
-        {"drain_x": 1.0, "drive": "crest", "drive_by": 5e-4},
-    ),
     "driven": (("flow", "cracked", "none"), {"drive": "crest", "drive_by": 5e-4}),
 }
 
 
-@pytest.mark.parametrize("scene", NETWORKS)
+@pytest.mark.parametrize("scene", further(4, NETWORKS))
 def test_runs_of_both_engines_agree_on_water_where_joints_meet(scene, tmp_path):
     write_blocks(tmp_path / "own.msh", BLOCKS, BLOCK_JOINTS)
     (tmp_path / "own.case").write_text('geometry = "own.msh";')
@@ -425,7 +424,7 @@ def test_runs_of_both_engines_agree_on_water_where_joints_meet(scene, tmp_path):
     assert any(map(changed, result.joints))
 
 
-@pytest.mark.parametrize("uplift", ["imposed", "flow", ("flow", "imposed", "cracked")])
+@pytest.mark.parametrize("uplift", further(1, ["flow", "imposed", ["flow", "imposed", "cracked"]]))
 def test_runs_of_both_engines_agree_while_water_reaches_a_second_heel(uplift, tmp_path):
     """That of the contraction joint, on the crest."""
     write_blocks(tmp_path / "own.msh", BLOCKS, BLOCK_JOINTS)
@@ -555,7 +554,7 @@ IN_TIME = {
 
 @pytest.mark.parametrize(
     "scene",
-    [*list(IN_TIME)[:2], *(pytest.param(s, marks=pytest.mark.heavy) for s in list(IN_TIME)[2:])],
+    further(1, IN_TIME),
 )
 def test_runs_of_both_engines_agree_on_water_in_time(scene, tmp_path):
     settings, levels = IN_TIME[scene]

@@ -8,6 +8,7 @@ from damjoint.input.resolve import load
 from damjoint.statics import gravity
 from damjoint.statics.hints import hints
 from numpy.testing import assert_allclose
+from variants import further
 
 
 @pytest.mark.parametrize("name, level, tail", [("e", 2, 0), ("g", 3, 1)])
@@ -68,7 +69,7 @@ def test_pressure_and_flux_follow_from_the_openings(solve, name, tolerance):
 
 
 @pytest.mark.parametrize("name", ["e", "g"])
-@pytest.mark.parametrize("steps", [5, 20])
+@pytest.mark.parametrize("steps", further(1, [5, 20]))
 def test_monotone_filling_with_flow_does_not_depend_on_the_steps(solve, name, steps):
     one, many = solve(name, "9")[0], solve(name, "9", steps=steps)[0]
     assert (
@@ -94,7 +95,7 @@ def test_water_up_to_a_waterstop(solve, slope):
     assert not rows["p"][rows["s"] > 1.2].any()
 
 
-@pytest.mark.parametrize("engine", ["condensed", "getdp"])
+@pytest.mark.parametrize("engine", further(1, ["condensed", "getdp"]))
 @pytest.mark.parametrize("slope, level, tail", [(4, 5.3, 0), (4, 5.3, 5.35), (-4, 4.9, 4.8)])
 def test_no_water_enters_at_a_dry_end(tmp_path, engine, slope, level, tail):
     """A lift joint from 5 m at the heel to 5.4 m or 4.6 m at the toe, one of them above the water:

@@ -13,6 +13,7 @@ from damjoint.engines.getdp import process
 from damjoint.input.case_names import CASES
 from damjoint.storage import locked_folder
 from test_output import read
+from variants import further
 
 SMALL = ("--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4")
 BARE = (*SMALL, "--no-fields", "--no-picture")
@@ -83,7 +84,8 @@ def test_bad_input_leaves_an_earlier_run_unchanged(command, tmp_path):
 
 @pytest.mark.usefixtures("no_pictures")
 @pytest.mark.parametrize(
-    "newer", [("check", "c", "--out", "out"), ("run", "c", "--out", "out/c"), ("run", "c")]
+    "newer",
+    further(1, [["check", "c", "--out", "out"], ["run", "c", "--out", "out/c"], ["run", "c"]]),
 )
 def test_the_table_of_a_check_does_not_stay_beside_a_newer_run_that_fails(
     command, tmp_path, monkeypatch, newer
@@ -188,7 +190,7 @@ def test_only_files_of_damjoint_are_removed(command, tmp_path):
     assert (tmp_path / "out" / "curve.csv").read_text() == "mine"
 
 
-@pytest.mark.parametrize("engine", ["getdp", "condensed"])
+@pytest.mark.parametrize("engine", further(1, ["condensed", "getdp"]))
 def test_a_run_that_stops_writes_its_last_state(command, tmp_path, engine):
     """Tables, fields and picture, also between two requested levels."""
     hardening = "--set", "pena_tang=0", "--set", "uplift=none"
@@ -314,14 +316,17 @@ def first_run(tmp_path_factory):
     return f"[ -d {record} ] || {{ {run}; }}; cp -r {record}/. . && cat printed"
 
 
-@pytest.mark.parametrize("size", [0, -1])
+@pytest.mark.parametrize("size", further(1, [0, -1]))
 @pytest.mark.parametrize(
     "name",
-    [
-        *("scene.pre", "history.txt", "joints.txt", "status.txt", "jump_0_1.txt"),
-        *("traction_0_2.txt", "path_0_2.txt", "mean_jump_0_0_1.txt", "law_scalar_0_2.txt"),
-        *("u_1_1.txt", "stress_2.txt"),
-    ],
+    further(
+        6,
+        [
+            *("scene.pre", "history.txt", "joints.txt", "status.txt", "jump_0_1.txt"),
+            *("traction_0_2.txt", "path_0_2.txt", "mean_jump_0_0_1.txt", "law_scalar_0_2.txt"),
+            *("u_1_1.txt", "stress_2.txt"),
+        ],
+    ),
 )
 def test_a_truncated_file_of_getdp_is_reported(
     command, tmp_path, fake_getdp, first_run, name, size

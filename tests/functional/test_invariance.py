@@ -7,6 +7,7 @@ from damjoint import runner
 from damjoint.engines.getdp import law
 from damjoint.input.resolve import load
 from numpy.testing import assert_allclose
+from variants import further
 
 
 @pytest.mark.parametrize("name", ["a", "c"])
@@ -115,9 +116,9 @@ def test_emptying_depends_little_on_the_steps(solve):
 
 
 @pytest.mark.parametrize(
-    "name, levels", [("c", "6,9,2,8"), ("a", "6,9,2,8"), ("i", "9,1,9"), ("g", "9,4,9")]
+    "name, levels", further(2, [("c", "6,9,2,8"), ("g", "9,4,9"), ("a", "6,9,2,8"), ("i", "9,1,9")])
 )
-@pytest.mark.parametrize("nodes", [4, pytest.param(12, marks=pytest.mark.heavy)])
+@pytest.mark.parametrize("nodes", further(1, [4, 12]))
 def test_every_row_of_the_joint_table_obeys_the_law(solve, name, levels, nodes):
     """The law along the jumps of each node, level after level, gives the same stresses."""
     result = solve(name, levels, uplift=load(name)["uplift"])[0]

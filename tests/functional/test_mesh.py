@@ -21,7 +21,7 @@ PUBLISHED = {
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.heavy) if n in "dh" else n for n in PUBLISHED]
+    "name", [pytest.param(n, marks=pytest.mark.heavy) if n in "bdfh" else n for n in PUBLISHED]
 )
 def test_element_counts(name):
     counts = mesh.Mesh(load(name)).counts

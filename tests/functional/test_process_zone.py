@@ -46,6 +46,7 @@ def test_the_hint_stands_where_an_opened_zone_has_less_than_three_elements(
     assert not any("process zone" in hint for hint in hints(closed))
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("n_joint, G_t, expected", [(20, 10, True), (20, 1e3, False)])
 def test_the_hint_on_shear_stands_where_the_joint_has_slipped(solve, n_joint, G_t, expected):
     """A closed joint with a cohesion of 250 kPa: zones shorter and longer than three elements."""

@@ -92,7 +92,11 @@ def test_no_lines_before_the_interval_or_if_not_wanted(monkeypatch):
     "words, pattern",
     [
         (("run", "dam", *SMALL, "--no-fields", "--no-picture"), r"^dam, \d+ %, \d\d:\d\d"),
-        (("critical", "dam", *SMALL), r"^dam: level [\d.]+ m: level [\d.]+ m, \d\d:\d\d"),
+        pytest.param(
+            ("critical", "dam", *SMALL),
+            r"^dam: level [\d.]+ m: level [\d.]+ m, \d\d:\d\d",
+            marks=pytest.mark.heavy,
+        ),
         (("sweep", "dam", *SMALL, "--vary", "mu=0.5,0.6", "--jobs", "1"), r"^sweep dam, \d+ %, "),
     ],
 )

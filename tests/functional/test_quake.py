@@ -40,6 +40,7 @@ from matplotlib.text import Text
 from quakes import BLOCK, DAM, earthquake, joint_of, mean_slip, smooth_record, write_record
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
+from variants import further
 
 G = 9.81
 
@@ -147,7 +148,7 @@ def body_inertia(quake, bodies):
     "alpha, vertical, rock_mass",
     [
         (-0.3, True, 0),
-        (-0.05, True, 1),
+        pytest.param(-0.05, True, 1, marks=pytest.mark.heavy),
         pytest.param(-0.05, False, 0, marks=pytest.mark.heavy),
         pytest.param(0.0, False, 0, marks=pytest.mark.heavy),
     ],
@@ -257,7 +258,7 @@ def test_frequencies_against_a_dense_eigenvalue_solution(tmp_path):
     assert quake.frequencies == pytest.approx(expected, rel=1e-7)
 
 
-@pytest.mark.parametrize("braked", [2.0, 1.0])
+@pytest.mark.parametrize("braked", further(1, [2.0, 1.0]))
 def test_free_vibration_decays_as_rayleigh_damping_says(tmp_path, braked):
     """In the first mode, at the damping's first frequency: amplitude exp(-xi omega t); braked by
     its mass part with the added water (2), or without (1).
@@ -802,12 +803,12 @@ def test_notes_come_before_the_numbers(command, case_file):
     """Steps that do not resolve the first period; an offset of the record."""
     rows = read(smooth_record(Path("wave.csv"), 5.0, duration=0.5, frequency=4.0)).rows
     write_record(Path("wave.csv"), rows[:, 0], rows[:, 1] + 0.3)
-    _, out, _ = command("quake", case_file, *LONG_STEPS)
+    _, out, _ = command("quake", case_file, *LONG_STEPS, "--no-picture")
     assert [line.startswith("note: ") for line in out.splitlines()[:5]].count(True) == 2
     assert "the horizontal record leaves the ground with 0.15" in out
     assert "dt = 0.01 s is longer than a thirtieth of the first period, 0.00537 s" in out
     better = "--set", "record_baseline=corrected", "--set", "dt=0.005"
-    assert "note: " not in command("quake", case_file, *better)[1]
+    assert "note: " not in command("quake", case_file, *better, "--no-picture")[1]
 
 
 def test_a_joint_that_stays_closed_has_no_peak_of_its_opening(command, case_file, tmp_path):
@@ -1204,6 +1205,7 @@ def test_a_dam_without_static_equilibrium_is_a_failed_run(command, case_file):
     assert json.loads(Path("out/my_quake/run.json").read_text())["state"] == "failed"
 
 
+@pytest.mark.heavy
 def test_bases_speak_for_the_dam_and_the_map_names_its_joint(tmp_path):
     """A contraction joint has no rigid block, its forces are not drawn; the notes are."""
     smooth_record(tmp_path / "r.csv", 2.0, duration=0.4)

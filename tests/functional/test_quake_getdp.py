@@ -16,6 +16,7 @@ from damjoint.input.resolve import load
 from damjoint.post import folder
 from damjoint.studies import quake_getdp
 from quakes import DAM, earthquake, smooth_record, write_record
+from variants import further
 
 SHORT = DAM | {"record_rest": 0.0, "dt": 0.005}
 BOND = {"law": "bond", "sigma_max": 2e5, "G_f": 100.0, "G_t": 1000.0, "adhesion": 3e5}
@@ -86,7 +87,7 @@ def agree(rows, expected):
             assert rows[name] == pytest.approx(expected[name], rel=0, abs=1e-5 * scale), name
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", further(1, SCENES))
 def test_slip_agrees_with_the_condensed_engine(tmp_path, scene):
     rows, expected, _ = both(tmp_path, SCENES[scene])
     agree(rows, expected)

@@ -22,7 +22,7 @@ from numpy.testing import assert_allclose
 from processes import without_progress
 from scipy import stats
 
-SLIDES = {"law": "friction", "adhesion": 0.0, "pena_tang": 0.0, "n_joint": 40, "order": 1}
+SLIDES = {"law": "friction", "adhesion": 0.0, "pena_tang": 0.0, "n_joint": 10, "order": 1}
 #: mean 0.75, standard deviation 0.09
 MU = "lognorm(0.119571287,scale=0.744657629)"
 VARIED = {"mu": MU, "rho_dam": "normal(2400,50)", "level": "gumbel_r(38.5,0.6)"}
@@ -113,6 +113,7 @@ def test_probability_of_a_normal_margin_is_exact():
         assert result.rows.form[0] == pytest.approx(stats.norm.cdf(-beta), rel=5e-3)
 
 
+@pytest.mark.heavy
 def test_rank_correlation_is_that_of_the_copula():
     """Spearman's correlation of level and density, both normal; the exact beta where the critical
     level is linear in the density.
@@ -162,6 +163,7 @@ def test_three_joints_against_closed_form_samples():
     assert result.design["lift 12 m.mu"] == pytest.approx(0.614902, rel=1e-6)
 
 
+@pytest.mark.heavy
 def test_samples_around_the_design_point_are_unbiased():
     """The mean of 200 studies with closed-form levels, and how many of their intervals have the
     probability: that of 2e7 samples. Of 95 %, 180 to 198 of 200 in 99.8 % of such tests.
@@ -211,7 +213,8 @@ def rows(path):
         return list(csv.DictReader(file))
 
 
-def test_files_and_continuation(command, tmp_path):
+@pytest.mark.heavy
+def test_files_and_continuation(painted, command, tmp_path):
     """A second call computes nothing and prints the same; the design point is a case that runs, and
     its critical level is its level.
     """
@@ -256,6 +259,7 @@ def test_other_variables_replace_the_file(command, tmp_path):
     ]
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_an_interrupted_study_ends_at_once_and_keeps_its_levels(tmp_path, jobs):
     """OpenTURNS handles interrupts itself while it runs."""
@@ -267,7 +271,7 @@ def test_an_interrupted_study_ends_at_once_and_keeps_its_levels(tmp_path, jobs):
         stderr=subprocess.PIPE,
         text=True,
     ) as process:
-        while not path.exists() or len(path.read_text().splitlines()) < 30:
+        while not path.exists() or len(path.read_text().splitlines()) < 11:
             assert process.poll() is None
             time.sleep(0.05)
         os.killpg(process.pid, signal.SIGINT)
@@ -276,7 +280,7 @@ def test_an_interrupted_study_ends_at_once_and_keeps_its_levels(tmp_path, jobs):
     assert without_progress(error).splitlines() == [
         "damjoint: interrupted; results finished so far are saved"
     ]
-    assert 29 <= len(rows(path)) < 500
+    assert 10 <= len(rows(path)) < 500
     assert json.loads((path.parent / "run.json").read_text())["state"] == "interrupted"
 
 

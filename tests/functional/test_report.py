@@ -34,11 +34,12 @@ levels() = {8, 10};  tail_levels() = {0, 1};
 
 
 @pytest.fixture(scope="module")
-def ran(tmp_path_factory):
+def ran(painting, tmp_path_factory):
     """The folder of a run."""
     work = tmp_path_factory.mktemp("ran")
     (work / "my.case").write_text(CASE)
-    assert cli.main(["run", str(work / "my.case"), *SMALL, "--out", str(work / "my")]) == 0
+    with painting():
+        assert cli.main(["run", str(work / "my.case"), *SMALL, "--out", str(work / "my")]) == 0
     return work / "my"
 
 
@@ -60,7 +61,7 @@ def folder(ran, tmp_path):
     return shutil.copytree(ran, tmp_path / "out" / "my")
 
 
-def test_plot_redraws_the_pictures_of_a_run(command, folder):
+def test_plot_redraws_the_pictures_of_a_run(painted, command, folder):
     path = folder / "my.png"
     drawn = np.asarray(Image.open(path)).astype(float)
     path.unlink()
@@ -82,7 +83,7 @@ def test_plot_of_a_run_with_displacement_control(command, texts_drawn):
 
 
 @pytest.mark.heavy
-def test_plot_and_report_of_a_user_geometry(command, tmp_path):
+def test_plot_and_report_of_a_user_geometry(painted, command, tmp_path):
     """A stepped base, the joint's ends read from the mesh; no gravity method without a section."""
     few = "--set", "n_joint=20", "--set", "order=1", "--levels", "40", "--tail-levels", "4"
     assert command("run", "stepped", *few)[0] == 0
@@ -242,16 +243,26 @@ def test_lever_arms_of_the_uplift_on_a_sloping_joint():
 COMBINATIONS = {"usual": (8, 0.1), "flood": (11, 50), "empty": (0.5, 0)}
 
 
-@pytest.fixture(scope="module")
-def checked(tmp_path_factory):
+def check_into(work):
     """The folder of damjoint check for three load combinations."""
-    work = tmp_path_factory.mktemp("checked")
     for name, (level, factor) in COMBINATIONS.items():
         text = CASE.replace("<i>my</i> dam & joint", name).replace("{8, 10}", f"{{8, {level}}}")
         (work / f"{name}.case").write_text(text.replace("SSF = 50", f"SSF = {factor}"))
     cases = [str(work / f"{name}.case") for name in COMBINATIONS]
     assert cli.main(["check", *cases, *SMALL, "--out", str(work / "out")]) == 1
     return work / "out"
+
+
+@pytest.fixture(scope="module")
+def checked(tmp_path_factory):
+    return check_into(tmp_path_factory.mktemp("checked"))
+
+
+@pytest.fixture(scope="module")
+def painted_check(painting, tmp_path_factory):
+    """The same with painted pictures."""
+    with painting():
+        return check_into(tmp_path_factory.mktemp("painted"))
 
 
 @pytest.fixture(scope="module")
@@ -453,7 +464,7 @@ def test_values_are_merged_over_runs():
 
 
 @pytest.mark.heavy
-def test_pages_of_the_report_as_pdf(command, checked, page_of_check, tmp_path, monkeypatch):
+def test_pages_of_the_report_as_pdf(painted, painted_check, command, tmp_path, monkeypatch):
     """Nothing is wider than the page's text, no page ends with a heading, none is half empty."""
     weasyprint = pytest.importorskip("weasyprint", exc_type=(ImportError, OSError))
     render, documents = weasyprint.HTML.render, []
@@ -463,9 +474,7 @@ def test_pages_of_the_report_as_pdf(command, checked, page_of_check, tmp_path, m
         return documents[-1]
 
     monkeypatch.setattr(weasyprint.HTML, "render", kept)
-    monkeypatch.setattr(report, "read_section", lambda *_: None)
-    monkeypatch.setattr(report, "page_of", lambda *_: page_of_check)
-    assert command("report", checked, "--to", "my.PDF") == (0, "my.PDF\n", "")
+    assert command("report", painted_check, "--to", "my.PDF") == (0, "my.PDF\n", "")
     content = (tmp_path / "my.PDF").read_bytes()
     assert content.startswith(b"%PDF-") and content.rstrip().endswith(b"%%EOF")
     (pages,) = (document.pages for document in documents)
@@ -498,6 +507,7 @@ def test_the_caption_of_maps_of_a_joint_has_no_colors_of_curves():
     assert any(text.startswith("Joint at level 40 m. Red: broken") for text in dam)
 
 
+@pytest.mark.heavy
 def test_a_pdf_whose_pictures_are_not_whole_is_not_written(command, checked, monkeypatch):
     """weasyprint catches all that stops it in a picture, also a signal, and only logs it."""
     images = pytest.importorskip("weasyprint.svg", exc_type=(ImportError, OSError))

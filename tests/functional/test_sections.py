@@ -10,6 +10,7 @@ from damjoint.input.resolve import load
 from damjoint.statics import gravity
 from numpy.testing import assert_allclose
 from sections import resultants
+from variants import further
 
 SHAPES = {
     "plain": {},
@@ -67,7 +68,7 @@ def check(result, share=1.0):
     assert last["U"] == pytest.approx(uplift, rel=1e-9)
 
 
-@pytest.mark.parametrize("levels, tails", [("20,43", "0,3"), ("46.5", "24")])
+@pytest.mark.parametrize("levels, tails", further(1, [("20,43", "0,3"), ("46.5", "24")]))
 @pytest.mark.parametrize("shape", SHAPES)
 def test_resultants_of_water_on_a_section(solve, shape, levels, tails):
     (result,) = solve("dam", levels, tails, **SMALL, **SHAPES[shape])
@@ -190,7 +191,7 @@ def test_an_impossible_section_is_refused(settings, message):
         load("dam", settings)
 
 
-@pytest.mark.parametrize("effectiveness", [pytest.param(0.0, marks=pytest.mark.heavy), 0.5, 1.0])
+@pytest.mark.parametrize("effectiveness", further(1, [1.0, 0.5, 0.0]))
 def test_drains_in_the_uncracked_part(solve, effectiveness):
     """As in the gravity method, on a rigid dam; there is a node at the drains."""
     drains = {"drains": 1, "drain_x": 4, "drain_effectiveness": effectiveness}

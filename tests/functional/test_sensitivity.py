@@ -195,9 +195,8 @@ def histories(case):
     return rows if len(rows) == len(case.levels) else None
 
 
-@pytest.mark.parametrize(
-    "numbers", [(0, 2, 3), pytest.param((6, 7, 9, 11, 12, 13, 15), marks=pytest.mark.heavy)]
-)
+@pytest.mark.heavy
+@pytest.mark.parametrize("numbers", [(0, 2, 3), (6, 7, 9, 11, 12, 13, 15)])
 def test_random_dams_against_central_differences(numbers):
     """Of random laws, uplifts, lifts, loads and works; one of their parameters each, to 1e-6 of the
     derivative, or of the result for a relative change of one; away from kinks.

@@ -9,12 +9,13 @@ from damjoint.mesh.mesh import mesh_of
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.solver.newton import Convergence, Iterate, NotConverged, Strategy, newton
 from damjoint.statics.verdict import verdict
+from variants import further
 
 #: A dam of realistic stiffness; the shear release of its joint is far shorter than its jumps.
 RELEASED = {"law": "rupture", "dam_height": 40, "dam_base": 30, "E": 1e10, "sigma_max": 0}
 
 
-@pytest.mark.parametrize("uplift", ["imposed", "flow"])
+@pytest.mark.parametrize("uplift", further(1, ["imposed", "flow"]))
 @pytest.mark.parametrize("n_joint", [60, pytest.param(100, marks=pytest.mark.heavy)])
 def test_a_joint_without_tensile_strength_opens_in_one_step(solve, uplift, n_joint):
     """Some points are in equilibrium neither closed nor open, but within the shear release."""

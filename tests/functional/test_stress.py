@@ -258,6 +258,7 @@ def test_flow_in_time_is_selected_and_counted(tmp_path):
         assert counts["flow in time, with drains"] == str(len(with_drains))
 
 
+@pytest.mark.heavy
 def test_stress_is_reproducible_and_resumed_and_makes_a_page(command, monkeypatch):
     pytest.importorskip("skfem")
     monkeypatch.setattr(stress, "TIME_LIMIT", 60)

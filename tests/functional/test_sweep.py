@@ -64,6 +64,7 @@ def test_a_sweep_is_resumed(command, tmp_path):
     assert (tmp_path / "sweep.csv").read_text() == after
 
 
+@pytest.mark.heavy
 def test_an_interrupted_sweep_ends_at_once_and_keeps_its_rows(tmp_path):
     """Not after the minute that the other rows would take."""
     words = "sweep", "c", "--set", "n_joint=20", "--vary", "mu=0.3:0.7:1e-4", "--jobs", "2"
@@ -322,9 +323,11 @@ def test_a_chart_of_texts_has_categories(command, tmp_path, monkeypatch):
     assert "required 3" in [text.get_text() for text in factor.get_legend().get_texts()]
 
 
+@pytest.mark.heavy
 def test_rows_that_fail_do_not_set_the_scale_of_a_chart(command, tmp_path, monkeypatch):
     """Their last state may be a metre from the others; few values are ticks and curves."""
     words = "dam", "--vary", "level=30,40,60", "--set", "dam_base=26", "--set", "law=bond"
+    words += "--set", "smallest_step=0.1"
     panels = chart_panels(command, tmp_path, monkeypatch, *words)
     opening = panels["largest opening"]
     assert list(opening.get_xticks()) == [30, 40, 60]

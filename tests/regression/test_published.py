@@ -82,7 +82,9 @@ def test_validate_exits_with_1_if_a_row_fails(command, monkeypatch):
     [
         # long ones, of which other tests have parts by default: test_sdnv138.py, test_law_endo.py,
         # test_wtnp128.py
-        pytest.param(f, marks=pytest.mark.heavy) if f in ("sdnv138", "ssnp164", "wtnp128") else f
+        pytest.param(f, marks=pytest.mark.heavy)
+        if f in ("sdnv138", "ssnp143", "ssnp164", "wtnp128")
+        else f
         for f in validation.FAMILIES
         if f != "ssnp142"
     ],

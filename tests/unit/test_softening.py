@@ -6,6 +6,7 @@ from damjoint import InputError
 from damjoint.engines.getdp import law
 from damjoint.input.resolve import load
 from numpy.testing import assert_allclose
+from variants import further
 
 K_N, K_T, F, C, MU = 1e11, 5e10, 2e5, 3e5, 0.7
 G_F, G_T = 100.0, 400.0
@@ -54,7 +55,7 @@ def test_pure_opening_is_czm_exp_reg(law_name):
 
 
 @pytest.mark.parametrize("curve", CURVES)
-@pytest.mark.parametrize("law_name", ["bond", "rupture"])
+@pytest.mark.parametrize("law_name", further(1, ["bond", "rupture"]))
 def test_opening_has_the_strength_the_curve_and_the_energy(law_name, curve):
     xi = np.r_[np.linspace(0, 1, 2001), np.linspace(1, FAR, 4001)[1:]]
     opening = np.r_[0, D_E + xi * (D_C - D_E)]
@@ -66,8 +67,8 @@ def test_opening_has_the_strength_the_curve_and_the_energy(law_name, curve):
     assert work(jumps, traction) == pytest.approx(G_F, rel=1e-5)  # of the trapezoidal rule
 
 
-@pytest.mark.parametrize("curve", CURVES)
-@pytest.mark.parametrize("pressure", [0.0, 5e5])
+@pytest.mark.parametrize("curve", further(1, CURVES))
+@pytest.mark.parametrize("pressure", further(1, [5e5, 0.0]))
 def test_sliding_has_the_strength_the_curve_and_the_energy(curve, pressure):
     """The area above the residual friction over the slip is G_t, elastic part included."""
     xi = np.r_[np.linspace(0, 1, 2001), np.linspace(1, FAR, 4001)[1:]]
@@ -81,7 +82,7 @@ def test_sliding_has_the_strength_the_curve_and_the_energy(curve, pressure):
     assert above == pytest.approx(G_T, rel=1e-5)  # of the trapezoidal rule
 
 
-@pytest.mark.parametrize("curve", CURVES)
+@pytest.mark.parametrize("curve", further(1, CURVES))
 def test_both_modes_together_dissipate_both_energies(curve):
     """Where opening and slip do the same damage; where one of them does less, its strength is lost
     with the other's, after less slip: the work is G_f and G_t times the integral of what is left.

@@ -27,6 +27,7 @@ import re
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import TypeAlias
 
@@ -317,10 +318,16 @@ def joint_name(height: float) -> str:
 
 def note_owner(case: CaseText, name: str, path: Path) -> None:
     """Note whether a parameter or list is set by a file of the user or by one of the package."""
-    if data("cases").resolve() in path.resolve().parents:
+    if is_packaged(path.absolute()):
         case.of_user.discard(name)
     else:
         case.of_user.add(name)
+
+
+@lru_cache
+def is_packaged(path: Path) -> bool:
+    """Whether a file, by its absolute path, is one of the package."""
+    return data("cases").resolve() in path.resolve().parents
 
 
 @contextlib.contextmanager
