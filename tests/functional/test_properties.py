@@ -176,6 +176,7 @@ CONSISTENT = {
         "auto",
     ),
     "controlled earthquake": (SHAKEN, "auto"),
+    "controlled energy": (BOND | {"drive": "dissipation", "drive_energy": 1e3}, "auto"),
     "mixed": (MIXED, "auto"),
     "in time": (IN_TIME_STEPS, "auto"),
     "grouted": (RUPTURE | {"grout_pressure": 5e4}, "auto"),
