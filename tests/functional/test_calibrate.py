@@ -209,10 +209,10 @@ def test_fewer_values_than_parameters_determine_none_of_them():
     assert_allclose(np.diag(inverse(np.array([[2.0, 0.0], [0.0, 4.0]]))), [0.25, 0.0625])
 
 
+@pytest.mark.heavy
 def test_a_start_without_equilibrium_names_the_reading(tmp_path, command):
     (tmp_path / "m.csv").write_text("level,crest_ux,crest_ux_sd\n30,1e-3,1e-4\n75,1e-3,1e-4\n")
     words = [f"--set={name}={value}" for name, value in COARSE.items()]
-    words.append("--set=smallest_step=0.25")
     code, _, err = command("calibrate", "dam", "m.csv", *words, "--free", "E_found")
     assert code == 1 and "reading 2 (level 75 m)" in err
 

@@ -185,6 +185,7 @@ def brittle():
     return search_result("dam", settings=settings, levels="40,48")
 
 
+@pytest.mark.heavy
 def test_the_gravity_method_without_tension(brittle):
     """Tensile strength above the linear stress at the heel and below the elastic one."""
     search, answer = brittle
@@ -235,6 +236,7 @@ def test_the_gravity_method_with_a_crack_past_the_drains():
     assert other.SSF == pytest.approx(1, abs=1e-4) and longer < first - 0.5
 
 
+@pytest.mark.heavy
 def test_the_first_unstable_crack_growth_is_the_critical_level(brittle):
     """A bond that breaks over 20 m: the level falls by more than a metre; displaced further, it
     rises to what friction holds, which is said beside it.

@@ -241,11 +241,14 @@ def test_random_earthquakes_can_be_loaded_and_have_all_laws_and_waters(tmp_path)
 
 @pytest.mark.parametrize(
     "settings",
-    [
-        {"hht_alpha": 0.0, "joint_damping_n": 1e8, "joint_damping_t": 5e7},
-        {"rock_mass": 1.0, "rho_found": 2600.0, "quake_uplift": "zero", "damping_mass": 1.0},
-        {"time_integration": "published", "joint_damping_n": 1e8},
-    ],
+    further(
+        1,
+        [
+            {"hht_alpha": 0.0, "joint_damping_n": 1e8, "joint_damping_t": 5e7},
+            {"rock_mass": 1.0, "rho_found": 2600.0, "quake_uplift": "zero", "damping_mass": 1.0},
+            {"time_integration": "published", "joint_damping_n": 1e8},
+        ],
+    ),
 )
 def test_the_equations_of_all_unknowns_and_the_balance_of_energy(tmp_path, settings):
     """Energy is conserved with alpha = 0, and otherwise lost; wrong masses are noticed."""
