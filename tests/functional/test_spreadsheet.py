@@ -69,6 +69,6 @@ def test_names_of_sheets_are_short_and_different():
 
 
 def test_cells_are_numbers_or_texts_as_they_are():
-    cells = map(spreadsheet.cell_of, ("1e3", "-0.5", "nan", "inf", "", "lift 12 m"))
+    cells = map(spreadsheet.parsed_cell, ("1e3", "-0.5", "nan", "inf", "", "lift 12 m"))
     assert list(cells) == [1000.0, -0.5, "", "inf", "", "lift 12 m"]
     assert math.isclose(float(spreadsheet.number_text(1 / 3, ".")), 1 / 3, rel_tol=1e-11)

@@ -15,7 +15,7 @@ from damjoint.model.fields import (
     state_of,
 )
 from damjoint.model.loads import STAGED, Loading
-from damjoint.pictures.outline import JointLine, section_of, skin
+from damjoint.pictures.outline import JointLine, section_outline, skin
 from damjoint.pictures.scene import displaced_faces, fluid_above, fluids
 from damjoint.units import FORCES, LENGTHS, unit, with_unit
 from numpy.testing import assert_allclose
@@ -59,7 +59,7 @@ def area(polygon):
 
 def test_outlines_of_a_lift_joint(lift):
     bodies, still, ends = lift
-    section = section_of(bodies, still, 1.0, joint_of(ends))
+    section = section_outline(bodies, still, 1.0, joint_of(ends))
     assert_allclose(section.upstream, [(2, 8), (1, 4)])
     assert_allclose(section.downstream, [(8, 4), (4, 8)])
     assert_allclose(section.crest, [(4, 8), (2, 8)])
@@ -86,7 +86,7 @@ def filled(section, still, level, tail=0.0, **settings):
 @pytest.mark.parametrize("on_crest", [0, 1])
 def test_area_of_water_up_to_a_level(lift, level, held, on_crest):
     """Beside a batter 1:4 from the end of the rock; over the crest only if water loads it."""
-    section = section_of(*lift[:2], 1.0, joint_of(lift[2]))
+    section = section_outline(*lift[:2], 1.0, joint_of(lift[2]))
     areas = filled(section, section, level, crest_water=on_crest, silt_height=1.0)
     assert areas["water"] == pytest.approx(held + 2 * on_crest * (level > 8))
     assert areas["silt"] == pytest.approx(5 + 1 / 8)
@@ -98,7 +98,7 @@ def test_water_follows_the_displaced_dam(lift):
     """
     bodies, still, ends = lift
     moved = still | {"dam": still["dam"] - (0.05, 0, 0)}
-    before, section = (section_of(bodies, u, 10.0, joint_of(ends)) for u in (still, moved))
+    before, section = (section_outline(bodies, u, 10.0, joint_of(ends)) for u in (still, moved))
     areas = filled(section, before, 0.0, 6.0)
     assert areas["water"] == pytest.approx(4 * (8 + 2) + 2 * (20 - 8 + 0.5 + 1))
     assert_allclose(section.crest[:, 0], (3.5, 1.5))
@@ -107,14 +107,14 @@ def test_water_follows_the_displaced_dam(lift):
 def test_ground_that_the_exaggerated_displacement_lowers_stays_dry(lift):
     bodies, still, ends = lift
     sunk = {name: u - (0, 0.3, 0) for name, u in still.items()}
-    before, section = (section_of(bodies, u, 10.0, joint_of(ends)) for u in (still, sunk))
+    before, section = (section_outline(bodies, u, 10.0, joint_of(ends)) for u in (still, sunk))
     assert filled(section, before, -1.0)["water"] == 0
 
 
 def test_a_body_without_a_face_at_the_lowest_z_has_no_section(lift):
     bodies, still, ends = lift
     bodies["dam"].points[:2, 2] = 1.0
-    assert section_of(bodies, still, 1.0, joint_of(ends)) is None
+    assert section_outline(bodies, still, 1.0, joint_of(ends)) is None
 
 
 def test_water_below_an_overhang():

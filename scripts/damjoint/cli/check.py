@@ -47,7 +47,7 @@ def call(arguments: argparse.Namespace) -> int:
     derivatives = arguments.sensitivity or "", deviations(arguments)
     checks = check_cases(cases, out, arguments.jobs, *derivatives)
     errors = [f"{check.case.name}: {check.accuracy}" for check in checks if check.accuracy]
-    derived = changes_of(cases, out, table_width(arguments)) if arguments.sensitivity else []
+    derived = change_lines(cases, out, table_width(arguments)) if arguments.sensitivity else []
     say(
         "\n\n".join(
             [text_table(checks, table_width(arguments)), *errors, *derived, str(out / "check.csv")]
@@ -56,7 +56,7 @@ def call(arguments: argparse.Namespace) -> int:
     return int(any(result.verdict in ("fail", NOT_JUDGED) for c in checks for result in c.results))
 
 
-def changes_of(cases: Sequence[Case], out: Path, width: int | None) -> list[str]:
+def change_lines(cases: Sequence[Case], out: Path, width: int | None) -> list[str]:
     """What the parameters change in each scene of cases, by its record below out; width: of the
     terminal, None: all columns.
     """

@@ -28,7 +28,7 @@ from .stepper import Earthquake
 
 def fingerprint(case: Case, span: tuple[float, float] | None) -> str:
     """Hash of all that an earthquake depends on; span: of its frames."""
-    record = record_files.content_of(case.record, case.record_vertical)
+    record = record_files.record_bytes(case.record, case.record_vertical)
     values = [joint.values for joint in case.joints]
     loading = case.levels, case.tail_levels, case.times
     scene = json.dumps([__version__, sources(), key_of(case), values, loading, span], default=str)

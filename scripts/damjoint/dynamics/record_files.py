@@ -86,7 +86,7 @@ def read(path: Path, vertical: Path | None = None) -> RecordFile:
     return RecordFile(rows, longer.lines, file.in_si)
 
 
-def content_of(path: Path | None, vertical: Path | None = None) -> bytes:
+def record_bytes(path: Path | None, vertical: Path | None = None) -> bytes:
     """The content of the files of a record; empty without one."""
     return b"".join(file.read_bytes() for file in (path, vertical) if file)
 

@@ -55,7 +55,7 @@ def pairs_of(shape: str) -> IntArray:
 
 
 @cache
-def locations_of(shape: str, order: int) -> Array:
+def function_locations(shape: str, order: int) -> Array:
     """Location of each function of an order, (n, d): the nodes, then the midpoints of pairs."""
     corners = corners_of(shape)
     middles = corners[pairs_of(shape)[:, 0]].mean(axis=1)
@@ -232,7 +232,7 @@ class Space:
         self.codes = np.zeros(0, np.int64)
         if order == 2:
             pairs = [cells[:, pairs_of(shape)] for shape, cells in body.cells]
-            codes = np.concatenate([codes_of(body.node_tags[p]).ravel() for p in pairs])
+            codes = np.concatenate([edge_codes(body.node_tags[p]).ravel() for p in pairs])
             middles = [body.points[p].mean(axis=(2, 3)).reshape(-1, 3) for p in pairs]
             self.codes, first, inverse = np.unique(codes, return_index=True, return_inverse=True)
             self.locations = np.vstack([body.points, np.concatenate(middles)[first]])
@@ -264,7 +264,7 @@ class Space:
         """Values at the locations, from the functions up to an order (locations, functions)."""
         rows, matrices = [], []
         for shape, table in self.connectivity:
-            local = [basis(shape, order, u)[0] for u in locations_of(shape, self.order)]
+            local = [basis(shape, order, u)[0] for u in function_locations(shape, self.order)]
             columns = np.repeat(table[:, : len(local[0])], len(local), axis=0)
             pointers = columns.shape[1] * np.arange(len(columns) + 1)
             data = np.tile(np.ravel(local), len(table))
@@ -276,7 +276,7 @@ class Space:
         return values.where(values.data != 0)
 
 
-def codes_of(pairs: IntArray) -> IntArray:
+def edge_codes(pairs: IntArray) -> IntArray:
     """Number of each product (..., n), from the node tags of its pairs (..., n, k, 2): equal in all
     elements that share the edge or face.
     """

@@ -115,7 +115,7 @@ class Camera:
 
 def undeformed_camera(case: Case) -> Camera:
     """All of the outline of a case."""
-    return Camera(frame(case, all_of_foundation=True), turn_of(case))
+    return Camera(frame(case, all_of_foundation=True), view_angles(case))
 
 
 def result_camera(case: Case, bodies: dict[str, Body]) -> Camera:
@@ -124,10 +124,10 @@ def result_camera(case: Case, bodies: dict[str, Body]) -> Camera:
     if case.geometry:
         dams = [body.points for name, body in bodies.items() if name.split(" ")[0] == "dam"]
         box = around(np.concatenate(dams), box)
-    return Camera(box, turn_of(case), strips=case["dim"] == 3)
+    return Camera(box, view_angles(case), strips=case["dim"] == 3)
 
 
-def turn_of(case: Case) -> tuple[int, int]:
+def view_angles(case: Case) -> tuple[int, int]:
     """Rotation of a scene."""
     if case["dim"] == 2:
         return PLANE

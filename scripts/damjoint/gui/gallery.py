@@ -61,7 +61,7 @@ class Gallery:
             data = np.vstack(parts)
             gmsh.view.addListData(tag, kind, len(data), data.ravel())
         steps = max((piece.values.shape[0] for piece in pieces), default=1)
-        self.set_step_of(tag, steps)
+        self.set_time_step(tag, steps)
         for option, value in {"ShowTime": 0, "NbIso": 4, **numbers}.items():
             gmsh.view.option.setNumber(tag, option, value)
         gmsh.view.option.setString(tag, "Format", "%.3g")
@@ -69,7 +69,7 @@ class Gallery:
         paint(tag, colors)
         return tag
 
-    def set_step_of(self, tag: int, steps: int) -> None:
+    def set_time_step(self, tag: int, steps: int) -> None:
         """Show the first step of the gallery in a view that has a number of steps."""
         step = steps - 1 if self.first_step is None else min(self.first_step, steps - 1)
         gmsh.view.option.setNumber(tag, "TimeStep", step)
@@ -92,7 +92,7 @@ class Gallery:
         self.tags.append(tag)
         self.label(tag, x, y, lines, size, align)
         self.color_texts(tag, color)
-        self.set_step_of(tag, len(lines))
+        self.set_time_step(tag, len(lines))
         return tag
 
     def label(

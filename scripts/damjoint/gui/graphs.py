@@ -121,7 +121,7 @@ class Graphs:
         if level is not None:
             of_steps = [scales[min(step, count - 1)] for step in range(len(level))]
             at_y = np.array([scale.intervals(y) for scale, y in zip(of_steps, level, strict=True)])
-            pieces = pieces_of(np.array(x_range), at_y[:, None].repeat(2, axis=1), x_range)
+            pieces = line_pieces(np.array(x_range), at_y[:, None].repeat(2, axis=1), x_range)
             self.line("level shown", (x, y), pieces, DARK, width=1)
         named = [curve for curve in curves if curve.name not in ("", BEFORE)]
         for curve in sorted(curves, key=lambda curve: curve.name != BEFORE):  # drawn below others
@@ -131,7 +131,7 @@ class Graphs:
             at_x = along_x.intervals(curve.x)
             if not curve.points:
                 at_x, lines = thinned(at_x, lines)
-            pieces = pieces_of(at_x, lines, x_range)
+            pieces = line_pieces(at_x, lines, x_range)
             self.line(name, (x, y), pieces, curve.color, curve.points, width=2)
             if curve in named and len(named) > 1:
                 position = x + self.layout.graph_size[0], y - 15 + 13 * named.index(curve)
@@ -163,12 +163,12 @@ class Graphs:
         # one line from side to side, along the sides between ticks
         over_rows, over_columns = fro(rows, left, right), fro(columns[::-1], low, high)
         grid = np.concatenate([over_rows, [(right, low)], over_columns[:, ::-1]])
-        pieces = pieces_of(grid[:, 0], grid[None, :, 1], (left, right))
+        pieces = line_pieces(grid[:, 0], grid[None, :, 1], (left, right))
         self.line(f"{titles[0]}, grid", position, pieces, GRID)
         box = np.array([(left, low), (right, low), (right, high), (left, high), (left, low)])
         at_x = np.concatenate([box[:, 0], [left, right]])
         zeros = np.array([np.append(box[:, 1], s.intervals(np.zeros(2))) for s in scales])
-        pieces = pieces_of(at_x, zeros, (left, right))
+        pieces = line_pieces(at_x, zeros, (left, right))
         tag = self.line(f"{titles[0]}, zero", position, pieces, GREY)
         self.gallery.color_texts(tag, DARK)
 
@@ -235,7 +235,7 @@ def fro(ticks: np.ndarray, start: float, end: float) -> np.ndarray:
 BESIDE_TITLE = 40
 
 
-def pieces_of(x: np.ndarray, y: np.ndarray, x_range: tuple[float, float]) -> Pieces:
+def line_pieces(x: np.ndarray, y: np.ndarray, x_range: tuple[float, float]) -> Pieces:
     """Lines through points x (n,), y (steps, n).
 
     Gmsh takes the range of x from the points: a line with values that are not drawn sets it.
@@ -253,7 +253,7 @@ def marks(x: np.ndarray, x_range: tuple[float, float]) -> Pieces:
     """Vertical lines over a graph, at each step at the place of its x (steps,)."""
     values = np.full((len(x), len(x), 4), BEYOND)
     values[np.arange(len(x)), np.arange(len(x)), 1:3] = extent(np.array([0.0, INTERVALS]))
-    return pieces_of(x.repeat(4), values.reshape(len(x), -1), x_range)
+    return line_pieces(x.repeat(4), values.reshape(len(x), -1), x_range)
 
 
 #: In intervals: pitch of points below which one is left out, where the curve bends less than this.

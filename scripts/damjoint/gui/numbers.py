@@ -12,7 +12,7 @@ import numpy as np
 from .. import ROUND_OFF
 from ..arrays import Table as Columns
 from ..model.results import HISTORY, QUAKE, Results, column_of
-from ..post.summary import SHOWN, Table, levels_table, requested_rows, table_of
+from ..post.summary import SHOWN, Table, formatted_table, levels_table, requested_rows
 from ..statics import gravity
 from ..statics.hints import hints
 from ..statics.notes import remarks
@@ -176,7 +176,7 @@ def shown_rows(quake: QuakeResult, joint: int) -> Columns:
 def table_of_frames(numbers: list[QuakeNumbers]) -> Table:
     """Table of the frames."""
     columns = ("time", "t", SECONDS), *QUAKE_SHOWN
-    return table_of(
+    return formatted_table(
         [
             (head, np.array([row.quake[name] for row in numbers]), units)
             for name, head, units in columns

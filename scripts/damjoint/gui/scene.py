@@ -64,7 +64,7 @@ class SolvedScene:
             message = reached(state, result)
         return [
             SolvedScene(
-                choices=choices_of(result, joint, MOTIONS[0]),
+                choices=scene_choices(result, joint, MOTIONS[0]),
                 result=result,
                 bodies=bodies,
                 fields=fields,
@@ -78,7 +78,7 @@ class SolvedScene:
                 table=table_of_levels(joint_result),
                 warnings=warnings(result),
             )
-            for joint, joint_result in first_of(decisive_joint(result), result)
+            for joint, joint_result in shown_first(decisive_joint(result), result)
         ]
 
     @staticmethod
@@ -89,10 +89,10 @@ class SolvedScene:
         static = Outcome(quake.before, lambda: quake.mesh, quake.static_fields)
         fields = quake.fields()
         scenes = SolvedScene.of(static)
-        for joint, _ in first_of(quake.joint, quake.frames):
+        for joint, _ in shown_first(quake.joint, quake.frames):
             numbers = QuakeNumbers.of(quake, joint)
             earthquake = SolvedScene(
-                choices=choices_of(quake.frames, joint, MOTIONS[1]),
+                choices=scene_choices(quake.frames, joint, MOTIONS[1]),
                 result=quake.frames,
                 bodies=quake.mesh.bodies,
                 fields=fields,
@@ -127,12 +127,12 @@ class SolvedScene:
         return Loading.at(case, at, state["level"], state["tail_level"])
 
 
-def first_of(joint: int, result: Results) -> list[tuple[int, Results]]:
+def shown_first(joint: int, result: Results) -> list[tuple[int, Results]]:
     """The numbers and results of all joints, one of them first."""
     return sorted(enumerate(result.joints), key=lambda pair: pair[0] != joint)
 
 
-def choices_of(result: Results, joint: int, motion: str) -> tuple[str, str, str]:
+def scene_choices(result: Results, joint: int, motion: str) -> tuple[str, str, str]:
     """See `SolvedScene.choices`; joint: its number."""
     return result.case.joint_names[joint], result.case.of_all_joints("uplift"), motion
 

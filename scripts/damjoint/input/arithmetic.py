@@ -208,7 +208,7 @@ def value_of(node: ast.expr, known: Mapping[str, float]) -> float:
     return number
 
 
-def call_of(text: str, unit: str) -> tuple[str, list[float], dict[str, float]]:
+def parsed_call(text: str, unit: str) -> tuple[str, list[float], dict[str, float]]:
     """Name, arguments and named arguments of 'name(1, 2, scale=3)', all of them numbers or
     arithmetic in the unit of a label.
 

@@ -19,7 +19,7 @@ from ..input.case import Case
 from ..input.values import flows, freezes_uplift, has_drains
 from ..laws import Law
 from ..model.loads import Loading, heads_at_ends
-from ..model.network import Network, WaterPath, networks_of
+from ..model.network import Network, WaterPath, water_networks
 from .flow import NO_NODES, Flow, FlowDerivative, FlowSolution, JointFields
 from .flow_in_time import (
     ROUNDING,
@@ -529,7 +529,7 @@ class WaterSystem:
         shut, closed = np.zeros(len(conductivity), bool), conductivity.copy()
         for drains in acting:
             if drains.remaining < 1:
-                water, of_joint = drains.water, self.slice_of(drains.water)
+                water, of_joint = drains.water, self.point_slice(drains.water)
                 assert water.drains
                 shut[of_joint] = water.drains[1] > 0
                 closed[of_joint] = water.scale * water.joint.points.weights
@@ -546,7 +546,7 @@ class WaterSystem:
         for drains in acting:
             if drains.remaining < 1 and not (before_quake and drains.water.freezes_uplift):
                 number, rate = shares.index(drains.remaining), np.zeros(len(conductivity))
-                rate[self.slice_of(drains.water)] = drains.rate
+                rate[self.point_slice(drains.water)] = drains.rate
                 with_it, without = [*layers, free][number : number + 2]
                 fades.append((effect * (with_it.pressure - without.pressure), rate))
         return replace(free.mixed(effect * shares[-1], mean), fades=fades)
@@ -661,14 +661,14 @@ class WaterSystem:
         """Gradient of the total head times the water's weight at the Gauss points of one of the
         joints, along the axes of its `JointFields`.
         """
-        of_joint = self.slice_of(water)
+        of_joint = self.point_slice(water)
         by_axis = {
             axis: sum(system.share * system.gradients[k][of_joint] for system in solution.systems)
             for k, axis in enumerate(self.fields.axes)
         }
         return [np.asarray(by_axis[axis]) for axis in water.joint.fields.axes]
 
-    def slice_of(self, water: JointWater) -> slice:
+    def point_slice(self, water: JointWater) -> slice:
         """The Gauss points of one of the joints among those of all."""
         sizes = [len(member.joint.points.weights) for member in self.members]
         number = self.members.index(water)
@@ -780,7 +780,7 @@ def water_systems(waters: Sequence[JointWater], interface: Interface) -> list[Wa
     """
     meshes, cases = [w.joint.mesh for w in waters], [w.case for w in waters]
     systems = []
-    for network in networks_of(meshes, cases):
+    for network in water_networks(meshes, cases):
         members = tuple(waters[k] for k in network.numbers)
         systems.append(WaterSystem(members, network, interface))
         for k, water in enumerate(members):

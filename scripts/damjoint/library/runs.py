@@ -13,7 +13,7 @@ import numpy as np
 from .. import runner
 from ..arrays import Table
 from ..engines import Outcome
-from ..engines.condensed.solve import threads_of
+from ..engines.condensed.solve import thread_number
 from ..input.case import Case
 from ..model.fields import Solution
 from ..model.results import Results
@@ -219,7 +219,7 @@ def load_steps(source: Case | str | Path) -> Iterator[Step]:
         [30.0, 40.0]
     """
     case = noted(as_case(source), 3)
-    threads = threads_of(case)
+    threads = thread_number(case)
     with limited_threads(threads):
         stepper = LoadStepper(case)
     steps = stepper.steps()

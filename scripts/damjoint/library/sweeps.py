@@ -19,11 +19,11 @@ from ..studies.plan import (
     Limits,
     Plan,
     Sample,
-    cases_of,
     column_of,
     in_file,
     listed,
     plan_with,
+    planned_cases,
     quantity_of,
 )
 from .cases import as_case, noted, on_fixed_mesh, warn
@@ -107,7 +107,9 @@ class Sweep(WithTables):
         """
         from ..studies.chart import figure_of, heading
 
-        cases = [] if self.plan.sampled else [case for _, case in cases_of(self.case, self.plan)]
+        cases = (
+            [] if self.plan.sampled else [case for _, case in planned_cases(self.case, self.plan)]
+        )
         title = heading(self.case, self.plan, len(self.rows))
         return displayed(figure_of(self.plan, self.texts, cases, title))
 

@@ -224,7 +224,7 @@ def sensitivity(
     """
     from ..studies.critical import Search
     from ..studies.sensitivity import ALL, DEVIATION, deviations_of, names_of, of_point, of_run
-    from ..studies.sensitivity import table as table_of
+    from ..studies.sensitivity import table as formatted_table
 
     chosen, deviations = on_fixed_mesh(noted(as_case(source))), deviations_of(vary or {})
     listed_names = names_of(chosen, ",".join(names) or ALL, not critical, deviations)
@@ -235,7 +235,7 @@ def sensitivity(
         rows = of_point(answer.point, listed_names)
     else:
         rows = of_run(chosen, listed_names)
-    table = table_of(rows)
+    table = formatted_table(rows)
     if deviations:
         table[DEVIATION] = [deviations.get(row.name, np.nan) for row in rows]
     return records(table)

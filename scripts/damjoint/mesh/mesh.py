@@ -33,7 +33,7 @@ from .regions import (
     section_regions,
     user_regions,
 )
-from .sides import is_inside, outward, part_of, sides
+from .sides import is_inside, outward, selected_part, sides
 from .topology import inner_ends
 from .user_geometry import NamedFace, UserGeometry
 
@@ -279,7 +279,7 @@ class Mesh:
         masks = {name: sides(surface, self.solids[name]) for name in bodies}
         if not np.any(list(masks.values()), axis=0).all():
             raise self._bad(f"a face of the {body}: its elements must be sides of its bodies'")
-        return [(n, part_of(surface, mask)) for n, mask in masks.items() if mask.any()]
+        return [(n, selected_part(surface, mask)) for n, mask in masks.items() if mask.any()]
 
     def _bad(self, why: str) -> InputError:
         """The error of a user's own geometry."""

@@ -62,7 +62,7 @@ def sides(surface: Body, body: Body) -> BoolArray:
     return np.asarray(cells_inside(surface, body) >= 0)
 
 
-def part_of(surface: Body, selected: BoolArray) -> Body:
+def selected_part(surface: Body, selected: BoolArray) -> Body:
     """Some elements of a surface."""
     ends = np.cumsum([len(table) for _, table in surface.cells])[:-1]
     chosen = np.split(selected, ends)

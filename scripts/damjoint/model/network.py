@@ -58,7 +58,7 @@ def sealed(joint: JointMesh, number: int) -> JointMesh:
     )
 
 
-def networks_of(joints: Sequence[JointMesh], cases: Sequence[Case]) -> list[Network]:
+def water_networks(joints: Sequence[JointMesh], cases: Sequence[Case]) -> list[Network]:
     """The networks of a scene, from the meshes and cases of its joints; none where no joints meet.
 
     Raises InputError if joints that meet have settings that do not go together.
@@ -274,7 +274,7 @@ def with_paths(case: Case, joints: Sequence[JointMesh]) -> Case:
 
     Raises InputError if joints that meet have settings that do not go together.
     """
-    networks = networks_of(joints, case.joints)
+    networks = water_networks(joints, case.joints)
     paths: dict[int, dict[str, list[float]]] = {}
     for network in networks:
         for k in network.numbers:

@@ -112,7 +112,7 @@ def figure_of_check(content: Content) -> Figure:
     name = result.case.named((joint,))
     of_joint = f"; diagrams: {name}" if name else ""
     title = textwrap.wrap(f"{heading(joint_result)}; check: {verdict}{of_joint}", 100)
-    loads = textwrap.wrap(f"loads: {loads_label(result.case, loading_of(method))}", 150)
+    loads = textwrap.wrap(f"loads: {loads_label(result.case, method_loading(method))}", 150)
     reasons = textwrap.wrap(why, 150)
     top = 0.97 - TITLE * len(title) - REASON * (len(loads) + len(reasons))
     (left, width), bottom = SECTION, BOTTOM + LEGEND
@@ -140,7 +140,7 @@ def figure_of_check(content: Content) -> Figure:
     return figure
 
 
-def loading_of(method: GravityMethod) -> Loading:
+def method_loading(method: GravityMethod) -> Loading:
     """The loading of the gravity method."""
     return Loading.at(method.case, method.time, method.level, method.tail_level)
 
@@ -156,7 +156,7 @@ def draw_verdicts(axes: Axes, cells: list[tuple[str, ...]], bottom: float, heigh
 
 def draw_scene(axes: Axes, method: GravityMethod, scene: Case) -> None:
     """Draw rock, all bodies of a scene, and its loads; the body above a joint in another color."""
-    case, body, loading = method.case, method.body, loading_of(method)
+    case, body, loading = method.case, method.body, method_loading(method)
     assert isinstance(body, RigidBlock)  # no picture is drawn of a geometry of a user
     faces = undeformed_faces(scene)
     up, down, floor, bed = (by_height(faces[side]) for side in (UP, DOWN, FLOOR, BED))

@@ -85,7 +85,7 @@ def figure_of(width: float, height: float, **options: Any) -> Figure:
     return figure
 
 
-def size_of(figure: AnyFigure) -> tuple[float, float]:
+def figure_size(figure: AnyFigure) -> tuple[float, float]:
     """Width and height of a figure or subfigure [inches]."""
     return figure.bbox.width / figure.dpi, figure.bbox.height / figure.dpi
 
@@ -124,7 +124,7 @@ def panels(
     down: float = 0.35,
 ) -> np.ndarray:
     """Create axes (rows, columns) in a figure or subfigure; margins and gaps in inches."""
-    width, height = size_of(figure)
+    width, height = figure_size(figure)
     axes_width = (width - left - right - (columns - 1) * across) / columns
     axes_height = (height - bottom - top - (rows - 1) * down) / rows
     grid = {

@@ -201,7 +201,7 @@ def union(bodies: list[PlaneBody]) -> PlaneBody:
     return PlaneBody(points, moved, faces, boundary(points, tables))
 
 
-def section_of(
+def section_outline(
     bodies: dict[str, Body],
     displacement: dict[str, np.ndarray],
     scale: float,

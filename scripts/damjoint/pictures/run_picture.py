@@ -50,12 +50,12 @@ from .drawing import (
     AnyFigure,
     draw_cells,
     figure_of,
+    figure_size,
     legend_above,
     panels,
     picture_style,
     pixels_of,
     runs_of,
-    size_of,
     widen,
     write_picture,
     write_pixels,
@@ -163,7 +163,7 @@ def write_heading(
     figure: AnyFigure, title: list[str], facts: list[str], message: list[str]
 ) -> None:
     """Write the lines of title, facts and message."""
-    width, height = size_of(figure)
+    width, height = figure_size(figure)
     x, y = MARGIN / width, 1 - 0.1 / height
     figure.text(x, y, "\n".join(title), fontsize=12, va="top", parse_math=False)
     y -= TITLE * len(title) / height
@@ -310,7 +310,7 @@ def mark_states(figure: AnyFigure, results: list[Results], time: float) -> None:
     states = [state_of(along(joint.at(time)), joint.case.law) for joint in results]
     occurring = [STATES[n].patch() for n in STATES if any((part == n).any() for part in states)]
     if occurring:
-        above = ABOVE_EDGE / size_of(figure)[1]
+        above = ABOVE_EDGE / figure_size(figure)[1]
         position: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.1, above)}
         style: dict[str, Any] = {"fontsize": 7.5, "frameon": False, "borderpad": 0.2}
         figure.legend(handles=occurring, ncols=len(occurring), **position, **style)
@@ -530,7 +530,7 @@ def draw_table(figure: AnyFigure, table: Table, note: str) -> None:
     heads = [f"{n}\n[{u}]" if u else n for n, u in zip(table.names, table.units, strict=True)]
     columns = zip(table.names, *table.rows, strict=True)
     letters = [max(map(len, column)) + 2 for column in columns]
-    height = size_of(figure)[1] - (0.4 if note else 0.2)
+    height = figure_size(figure)[1] - (0.4 if note else 0.2)
     box = (0.0, 0.0, 1.0, min(1.0, (2 + len(table.rows)) * 0.22 / height))
     left = 0, len(heads) - 1
     cells = draw_cells(axes, [heads, *table.rows], letters, box, 7, 0.02, left)
@@ -654,7 +654,7 @@ def draw_openings(figure: AnyFigure, solution: Solution, time: float) -> None:
         names, positions = projected(surface)
         values = openings[number][nearest_rows(surface.points, rows[number])]
         colors = axes.tripcolor(
-            Triangulation(positions[0], positions[1], triangles_of(surface)),
+            Triangulation(positions[0], positions[1], triangulated(surface)),
             values,
             cmap="YlOrRd",
             vmin=0,
@@ -672,7 +672,7 @@ def draw_openings(figure: AnyFigure, solution: Solution, time: float) -> None:
     figure.colorbar(colors, cax=bar, extend="max").ax.tick_params(labelsize=7)
 
 
-def triangles_of(surface: Body) -> np.ndarray:
+def triangulated(surface: Body) -> np.ndarray:
     """Triangles (n, 3) of the faces of a joint."""
     return np.concatenate(
         [table[:, part] for _, table in surface.cells for part in HALVES[table.shape[1]]]
@@ -686,7 +686,7 @@ def draw_maps(figure: AnyFigure, solution: Solution, time: float) -> None:
     rows, joint = solution.result.at(time), solution.bodies["joint"]
     nearest = nearest_rows(joint.points, rows)
     names, positions = projected(joint)
-    shape = Triangulation(positions[0], positions[1], triangles_of(joint))
+    shape = Triangulation(positions[0], positions[1], triangulated(joint))
     shown = (
         ("delta_n", "opening > 0, overlap < 0", LENGTHS),
         ("sigma_n_eff", "effective normal stress, tension > 0", STRESSES),

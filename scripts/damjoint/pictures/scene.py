@@ -25,7 +25,7 @@ from ..model.loads import COMPLETE, Loading, line_forces, thermal_strains
 from ..model.results import Results
 from ..statics import gravity
 from ..units import FORCES, STRESSES, with_unit
-from .outline import Section, area_between, exaggeration, joint_lines, section_of, skin
+from .outline import Section, area_between, exaggeration, joint_lines, section_outline, skin
 
 #: Sides of a section below water: of the reservoir, of water on the crest, of the tailwater.
 RESERVOIR, OVER, TAIL = (UP, FLOOR), (TOP,), (BED, DOWN)
@@ -257,7 +257,7 @@ class Scene:
         lines = joint_lines(self.case, [joint.rows[0] for joint in self.joints])
         #: sections, undeformed and by step; None if one section does not represent the geometry
         self.undeformed, *self.sections = (
-            section_of(dict(bodies), fields[time].displacement, scale, lines)
+            section_outline(dict(bodies), fields[time].displacement, scale, lines)
             if is_extruded(self.case)
             else None
             for time, scale in [(self.times[0], 0.0), *((t, self.scale) for t in self.times)]

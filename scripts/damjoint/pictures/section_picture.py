@@ -29,10 +29,10 @@ from .drawing import (
     WATER,
     AnyFigure,
     arrow_style,
+    figure_size,
     panels,
     polygons,
     runs_of,
-    size_of,
 )
 from .outline import Section
 from .scene import (
@@ -112,7 +112,7 @@ class SectionDrawing:
         handles, labels = zip(*self.legend, strict=True) if self.legend else ((), ())
         figure, more = self.axes.figure, -(-len(labels) // 2) - ROWS
         if more > 0:
-            height = size_of(figure)[1]
+            height = figure_size(figure)[1]
             box = self.axes.get_position(original=True)
             box.y0 = (BOTTOM + LEGEND * (1 + more / ROWS)) / height
             self.axes.set_position(box)
@@ -120,7 +120,7 @@ class SectionDrawing:
             handles,
             labels,
             loc="lower left",
-            bbox_to_anchor=(0.01, ABOVE_EDGE / size_of(figure)[1]),
+            bbox_to_anchor=(0.01, ABOVE_EDGE / figure_size(figure)[1]),
             ncols=2,
             fontsize=7.5,
             frameon=False,

@@ -82,7 +82,7 @@ def write_fields(solution: Solution, folder: Path) -> None:
                 "body": regions[name],
             }
             at_nodes = {DISPLACEMENT: everywhere(field, name)}
-            path = file_of(folder, name, time)
+            path = field_path(folder, name, time)
             write_vtu(path, body.points, body.cells, at_nodes, in_elements, whole)
         for k, surface in enumerate(fine_surfaces):
             on_faces = {
@@ -90,7 +90,7 @@ def write_fields(solution: Solution, folder: Path) -> None:
                 "opening [m]": np.maximum(on_joints[time][k]["jump"][:, 1], 0),
                 **{with_unit(name): values for name, values in on_joints[time][k].items()},
             }
-            path = file_of(folder, numbered("joint", k), time)
+            path = field_path(folder, numbered("joint", k), time)
             write_vtu(path, surface.points, surface.cells, on_faces, {}, whole)
     write_collection(solution, [*reversed(bodies)], folder)
     displacement = {t: np.vstack([f.displacement[n] for n in bodies]) for t, f in fields.items()}
@@ -113,7 +113,7 @@ def write_fields(solution: Solution, folder: Path) -> None:
         write_views(path, joint.points, joint.cells, joint_views)
 
 
-def file_of(folder: Path, part: str, time: float) -> Path:
+def field_path(folder: Path, part: str, time: float) -> Path:
     """File for ParaView of a body or joint at a time: dam_2_t1.5.vtu."""
     return folder / f"{part.replace(' ', '_')}_t{time:g}.vtu"
 
@@ -135,7 +135,7 @@ def of_order(body: Body, order: int) -> Body:
     for shape, table in space.connectivity:
         name = f"{shape}{table.shape[1]}"
         corners = elements.corners_of(shape)
-        middles = elements.locations_of(shape, 2)[len(corners) :]
+        middles = elements.function_locations(shape, 2)[len(corners) :]
         pairs = [tuple(map(int, pair)) for pair in QUADRATIC[name][1].split()]
         of_pairs = [(corners[a] + corners[b]) / 2 for a, b in pairs]
         indices = [int(np.abs(middles - at).sum(axis=1).argmin()) for at in of_pairs]
@@ -273,7 +273,7 @@ def write_collection(solution: Solution, bodies: Sequence[str], folder: Path) ->
     blocks = block_names(solution, bodies)
     entries = [
         f'<DataSet timestep="{shown!r}" name={quoteattr(block)} part="{part}" '
-        f'file="{file_of(folder, name, time).name}"/>\n'
+        f'file="{field_path(folder, name, time).name}"/>\n'
         for time, shown in shown_times(solution).items()
         for part, (name, block) in enumerate(blocks.items())
     ]

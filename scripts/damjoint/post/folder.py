@@ -205,7 +205,7 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
             "verdict": state or verdict(results),
             "statement": why or statement(results),
             "hints": hints(results),
-            **entries_of(case),
+            **case_entries(case),
             **results.info,
             "units": {
                 n: unit for n, (unit, _) in (joint_columns(case) | history_columns(case)).items()
@@ -214,7 +214,7 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
     )
 
 
-def entries_of(case: Case) -> dict[str, Any]:
+def case_entries(case: Case) -> dict[str, Any]:
     """The entries of run.json from which `post.stored` builds a case again."""
     return {
         "title": case.title,

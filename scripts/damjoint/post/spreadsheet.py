@@ -37,12 +37,12 @@ def rows_of(file: Path) -> Rows:
     """
     try:
         with file.open(newline="", encoding="utf-8") as opened:
-            return [list(map(cell_of, row)) for row in csv.reader(opened)]
+            return [list(map(parsed_cell, row)) for row in csv.reader(opened)]
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{file}: must be a CSV file ({error})") from None
 
 
-def cell_of(text: str) -> float | str:
+def parsed_cell(text: str) -> float | str:
     """A number, or another text as it is; nan is empty."""
     try:
         value = float(text)

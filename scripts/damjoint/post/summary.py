@@ -65,7 +65,7 @@ class Table(NamedTuple):
         ]
 
 
-def table_of(columns: Sequence[tuple[str, np.ndarray, Units]], digits: int = 4) -> Table:
+def formatted_table(columns: Sequence[tuple[str, np.ndarray, Units]], digits: int = 4) -> Table:
     """Format columns (name, values, units) with some digits in units that suit their size; what is
     below ROUND_OFF of a column's largest value is rounding and shown as 0.
     """
@@ -98,7 +98,7 @@ def levels_table(result: Results, displacements: Units | None = None) -> Table:
     if case["drive"] != "level" and "point_u" in history:
         moved = history["point_u"][rows]
         first.append(("point movement", moved, units_shown(LENGTHS, displacements)))
-    names, sizes, cells = table_of(
+    names, sizes, cells = formatted_table(
         first
         + [
             # one unit of forces in all tables
@@ -142,7 +142,7 @@ def joints_table(result: Results, time: float) -> Table:
         values = np.array([state[name] for _, state in joints])
         if name != "process_zone" or values.any():
             columns.append((head, values, LENGTHS[:1]))
-    table = table_of(columns, 3).beside("joint", result.case.joint_names)
+    table = formatted_table(columns, 3).beside("joint", result.case.joint_names)
     thirds = (gravity.position(s["x_resultant"], j.case.joint_length) for j, s in joints)
     graph = result.case.graph
     rows = [

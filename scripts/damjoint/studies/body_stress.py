@@ -14,10 +14,10 @@ from ..arrays import Array, BoolArray
 from ..mesh.body import Body
 from ..model.fields import Solution, along
 from ..pictures.drawing import GREY, panels
-from ..pictures.outline import Section, joint_lines, section_of, skin
+from ..pictures.outline import Section, joint_lines, section_outline, skin
 from ..pictures.run_picture import is_user_solid
 from ..post.field_files import principal
-from ..post.summary import Table, table_of
+from ..post.summary import Table, formatted_table
 from ..units import METRES, STRESSES, Units
 from .check import SafetyCheck
 
@@ -81,7 +81,7 @@ def extremes(solution: Solution, time: float) -> Table:
     columns = np.array(rows).T
     heads = ("largest", "at x", "y", "smallest", "at x", "y")
     units = (MEGAPASCAL, METRES, METRES) * 2
-    table = table_of(list(zip(heads, columns, units, strict=True)), 3)
+    table = formatted_table(list(zip(heads, columns, units, strict=True)), 3)
     return table.beside("principal stress", names)
 
 
@@ -117,7 +117,7 @@ def undeformed(solution: Solution, time: float) -> Section | None:
     if is_user_solid(result.case):
         return None
     lines = joint_lines(result.case, [joint.at(time) for joint in result.joints])
-    return section_of(solution.bodies, field.displacement, 0.0, lines)
+    return section_outline(solution.bodies, field.displacement, 0.0, lines)
 
 
 def faces(solution: Solution, time: float, section: Section) -> Table:
@@ -136,7 +136,7 @@ def faces(solution: Solution, time: float, section: Section) -> Table:
             (f"{side}, along the face", tangential, MEGAPASCAL),
             (f"{side}, normal to it", normal, MEGAPASCAL),
         ]
-    return table_of(columns, 3)
+    return formatted_table(columns, 3)
 
 
 def rock_pressure(solution: Solution, checks: list[SafetyCheck], time: float) -> Table | None:
@@ -168,7 +168,7 @@ def rock_pressure(solution: Solution, checks: list[SafetyCheck], time: float) ->
     columns = [
         (head, values, MEGAPASCAL) for head, values in zip(heads, np.array(numbers).T, strict=True)
     ]
-    return table_of(columns, 3).beside("pressure on the rock, total", names)
+    return formatted_table(columns, 3).beside("pressure on the rock, total", names)
 
 
 def draw_principal(figure: Figure, solution: Solution, time: float, section: Section) -> None:

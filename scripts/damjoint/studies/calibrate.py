@@ -133,7 +133,7 @@ def free(case: Case, name: str, limits: str | None) -> Free:
     start = float(case[name])
     low, high, prior = declared.minimum, declared.maximum, None
     if limits is not None and "(" in limits:
-        prior = prior_of(text, name, limits)
+        prior = parsed_prior(text, name, limits)
         if not low <= start <= high:
             raise InputError(f"{text}: must start at a value, {name} = {start:g}")
     elif limits is not None:
@@ -166,7 +166,7 @@ def limits_of(text: str, limits: str, unit: str) -> tuple[float, float]:
     return low, high
 
 
-def prior_of(text: str, name: str, words: str) -> tuple[float, float, bool]:
+def parsed_prior(text: str, name: str, words: str) -> tuple[float, float, bool]:
     """Mean and standard deviation of a normal prior; of a lognormal one those of the logarithm, and
     True. Raises InputError.
     """

@@ -163,14 +163,14 @@ def is_marked(plan: Plan, rows: list[Row]) -> np.ndarray:
     return fails(rows)
 
 
-def drawn_of(plan: Plan) -> dict[str, tuple[str, Units]]:
+def drawn_quantities(plan: Plan) -> dict[str, tuple[str, Units]]:
     """The quantities of the rows that are drawn: label and units by column."""
     return dict(DRAWN_OF_QUAKES if plan.quake else DRAWN)
 
 
 def panels_of(figure: Figure, table: Table) -> Iterator[tuple[Axes, str, tuple[str, Units]]]:
     """Create axes for what is drawn: DRAWN and SSF, those of earthquakes, or critical values."""
-    plan, drawn = table.plan, drawn_of(table.plan)
+    plan, drawn = table.plan, drawn_quantities(table.plan)
     if plan.critical:
         words, size = quantity_of(plan.critical)
         drawn = {plan.critical_columns[0]: (f"critical {words}", ((size, 1),))}
@@ -349,7 +349,7 @@ def draw_sample(figure: Figure, table: Table, names: list[str]) -> None:
 
     plan, rows = table.plan, table.rows
     inputs = sensitivities(plan, rows)
-    drawn = drawn_of(plan)
+    drawn = drawn_quantities(plan)
     other = SLIP if plan.quake else "max_opening"
     outcome = "failed" if 0 < fails(rows).sum() < len(rows) else other
     ranks = np.nan_to_num([row[outcome] for row in inputs])

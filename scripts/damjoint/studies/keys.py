@@ -15,10 +15,10 @@ from ..versions import code_fingerprint
 
 def key_of(case: Case, *others: Any) -> str:
     """The key of a scene and its loading, and of others that decide the result."""
-    return hashlib.sha256(repr([*identity_of(case), *others]).encode()).hexdigest()[:16]
+    return hashlib.sha256(repr([*case_identity(case), *others]).encode()).hexdigest()[:16]
 
 
-def identity_of(case: Case) -> Iterator[Any]:
+def case_identity(case: Case) -> Iterator[Any]:
     """All that decides the results of a scene, also the content of a mesh and the code."""
     yield sorted(case.values.items())
     yield from (case.levels, case.tail_levels, case.times, case.hardening_requested)

@@ -173,7 +173,7 @@ def read(path: Path, case: Case) -> Measurements:
             raise InputError(f"{path}: column {name}: has no column {name.removesuffix(DEVIATION)}")
     if not measured:
         raise InputError(f"{path}: must have a measured column, such as crest_ux with crest_ux_sd")
-    series = tuple(series_of(path, case, name, texts) for name in measured)
+    series = tuple(measured_series(path, case, name, texts) for name in measured)
     water = {name: values_of(path, name, texts[name]) for name in (LEVEL, TAIL) if name in texts}
     for name, levels in water.items():
         if not np.isfinite(levels).all():
@@ -197,7 +197,7 @@ def values_of(path: Path, name: str, texts: Sequence[str]) -> Array:
     return values
 
 
-def series_of(path: Path, case: Case, name: str, texts: dict[str, list[str]]) -> Series:
+def measured_series(path: Path, case: Case, name: str, texts: dict[str, list[str]]) -> Series:
     """The measurements of a column and of its standard deviations. Raises InputError."""
     columns = {n: c for n, c in history_columns(case).items() if n not in NOT_MEASURED}
     bad = f"{path}: column {name}:"

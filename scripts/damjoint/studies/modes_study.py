@@ -14,7 +14,7 @@ from ..pictures import modes_picture
 from ..post import tables
 from ..post.summary import aligned
 from ..session import preparation, session
-from .quake_result import damping_of
+from .quake_result import damping_text
 
 #: Headings of the printed table.
 HEADS = [
@@ -72,7 +72,7 @@ def about(natural: NaturalModes) -> str:
     water = f"added mass after {'Zangar' if case['added_mass'] == ZANGAR else 'Westergaard'}"
     water = water if case["added_mass"] else "added_mass = 0: the reservoir has no mass"
     first = natural.variants[0]
-    damping = damping_of({"damping": asdict(first.damping)})
+    damping = damping_text({"damping": asdict(first.damping)})
     return (
         f"joints closed and undamaged; reservoir {case.levels[-1]:g} m, {water}; with "
         f"{first.water} and {first.rock} rock {damping}"

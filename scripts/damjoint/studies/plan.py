@@ -414,7 +414,7 @@ def in_both_signs(plan: Plan, scale: float) -> Plan:
     return replace(plan, varied={**plan.varied, "record_scale": both})
 
 
-def cases_of(base: Case, plan: Plan) -> Iterator[tuple[dict[str, Value], Case]]:
+def planned_cases(base: Case, plan: Plan) -> Iterator[tuple[dict[str, Value], Case]]:
     """The values of each row, and the case with them.
 
     level: the last level, after the levels of the case below it. Raises InputError.

@@ -304,7 +304,7 @@ def compute(
             return result
 
 
-def bar_of(case: Case, record: Record, show: bool) -> Progress:
+def progress_bar(case: Case, record: Record, show: bool) -> Progress:
     """Progress over the seconds of a record."""
     return Progress(case.name, record.duration, show, bar_format=BAR, leave=False)
 
@@ -312,7 +312,7 @@ def bar_of(case: Case, record: Record, show: bool) -> Progress:
 def follow(run: QuakeRun, saved: Checkpoint | None, progress: bool) -> None:
     """Compute the steps to the end of the record; saved: is written meanwhile."""
     written, quake = time.perf_counter(), run.quake
-    with bar_of(quake.case, quake.record, progress) as bar:
+    with progress_bar(quake.case, quake.record, progress) as bar:
         bar.update(quake.now.time)
         for step in run.steps():
             bar.update(step)

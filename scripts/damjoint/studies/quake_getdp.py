@@ -58,7 +58,7 @@ def compute(case: Case, progress: bool = True) -> QuakeTables:
 def solve(vibrations: Earthquake, progress: bool) -> engine.GetdpQuake:
     """Run GetDP, with a progress bar."""
     case, record = vibrations.case, vibrations.record
-    with quake.bar_of(case, record, progress) as bar:
+    with quake.progress_bar(case, record, progress) as bar:
         reached = 0.0
 
         def on_step(time: float) -> None:

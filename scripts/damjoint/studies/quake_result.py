@@ -196,10 +196,11 @@ def modes(summary: dict[str, Any]) -> str:
             f"{mode['frequency']:.3g} Hz ({share:.0%} of the mass along {axis}, damping "
             f"{mode['damping']:.1%})"
         )
-    return f"natural modes, joint closed, with the water: {', '.join(texts)}; {damping_of(summary)}"
+    words = ", ".join(texts)
+    return f"natural modes, joint closed, with the water: {words}; {damping_text(summary)}"
 
 
-def damping_of(summary: dict[str, Any]) -> str:
+def damping_text(summary: dict[str, Any]) -> str:
     """What Rayleigh's damping of a summary is set to, and which part of it acts."""
     damping = summary["damping"]
     first, second = damping["first"], damping["second"]

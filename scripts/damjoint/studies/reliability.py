@@ -34,8 +34,8 @@ from ..threads import limited_threads
 from . import keys, sampling
 from .critical import Search
 from .critical_value import CriticalValue
-from .plan import Plan, Sample, cases_of, checked, in_file, rounded, up_to
-from .sweep import ERROR, message_of, search_of, spread_bundles
+from .plan import Plan, Sample, checked, in_file, planned_cases, rounded, up_to
+from .sweep import ERROR, error_message, search_of, spread_bundles
 
 #: Step of the central differences of levels, and of their derivatives for the curvatures, in
 #: standard deviations of the normal variables [-].
@@ -198,7 +198,7 @@ def row_of(case: Case, names: list[str]) -> dict[str, Value]:
             search = lower(case)
             answer = search.find()
     except Exception as error:
-        return dict(zip(RESULTS, ("", ERROR, "", 0.0, message_of(error)), strict=True))
+        return dict(zip(RESULTS, ("", ERROR, "", 0.0, error_message(error)), strict=True))
     level = answer.value
     if level is None:
         level = answer.point.level if answer.point else 0.0
@@ -264,7 +264,7 @@ class CriticalLevels:
         """
         plan = Plan({}, {n: [v] for n, v in values.items()}, dict(self.variables.tied))
         if not joint:
-            return next(case for _, case in cases_of(self.case, plan)) if values else self.case
+            return next(case for _, case in planned_cases(self.case, plan)) if values else self.case
         settings = dict(next(plan.rows())) if values else {}
         for other in self.case.joint_names:
             if other != joint:

@@ -12,7 +12,7 @@ from tabulate import tabulate
 
 from ..input.case import Case
 from ..input.written_case import case_text
-from ..post.folder import entries_of
+from ..post.folder import case_entries
 from ..processes import check_jobs
 from ..progress import Progress
 from ..session import session
@@ -31,7 +31,7 @@ from .reliability import (
     openturns,
 )
 from .result_file import result_file
-from .sweep import client_of, search_of
+from .sweep import scheduler_client, search_of
 
 #: Files of the study: the critical levels, and the case of the design point.
 ROWS, DESIGN = "reliability.csv", "design_point.case"
@@ -60,7 +60,7 @@ def reliability(
     variables.normal()
     rows, columns = out / ROWS, columns_of(variables)
     keep = of_same_columns(rows, columns)
-    with client_of(scheduler) as client, session(case, out, keep) as study:
+    with scheduler_client(scheduler) as client, session(case, out, keep) as study:
         numeric = [c for c in columns if c in ("critical_level", "confirmed")]
         with result_file(rows, columns, numeric) as (file, known):
             levels = CriticalLevels(case, variables, jobs, client, known)
@@ -89,7 +89,7 @@ def reliability(
             ]
             path = out / f"{case.name}{PICTURE}"
             reliability_picture.draw(results, heading(levels), values, path)
-        entries = {"reliability": as_json(levels, results), **entries_of(case)}
+        entries = {"reliability": as_json(levels, results), **case_entries(case)}
         study.save_without_results("complete", "", entries)
     return results, printed_lines(levels, results, out)
 
@@ -138,7 +138,7 @@ def as_json(levels: CriticalLevels, results: Sequence[Reliability]) -> dict[str,
     }
 
 
-def index_of(probability: float) -> float:
+def reliability_index(probability: float) -> float:
     """Reliability index of a probability."""
     return float(-stats.norm.ppf(probability))
 
@@ -147,12 +147,16 @@ def methods(one: Reliability) -> list[tuple[str, str, str]]:
     """Method, probability and reliability index of a reliability."""
     named = [("FORM", one.form), ("SORM (Breitung)", one.breitung), ("SORM (Tvedt)", one.tvedt)]
     rows = [
-        (name, "-" if p is None else f"{p:.4g}", "-" if p is None else f"{index_of(p):.4g}")
+        (
+            name,
+            "-" if p is None else f"{p:.4g}",
+            "-" if p is None else f"{reliability_index(p):.4g}",
+        )
         for name, p in named
     ]
     if one.samples:
         share = f"{one.sampled:.4g} ({one.low:.4g} to {one.high:.4g})"
-        betas = [f"{index_of(p):.4g}" for p in (one.sampled, one.high, one.low)]
+        betas = [f"{reliability_index(p):.4g}" for p in (one.sampled, one.high, one.low)]
         between = "{} ({} to {})".format(*betas) if one.sampled else "-"
         rows.append((f"{one.samples} samples", share, between))
     return rows

@@ -27,7 +27,7 @@ from ..pictures.drawing import figure_of, picture_style
 from ..pictures.report_picture import Picture, bands, embedded
 from ..post import stored
 from ..post.folder import read_info
-from ..post.summary import Table, joints_note, joints_table, levels_table, table_of
+from ..post.summary import Table, formatted_table, joints_note, joints_table, levels_table
 from ..post.validation import shown_time
 from ..statics.gravity import GravityMethod
 from ..statics.rigid_block import force, resultant_of
@@ -60,7 +60,7 @@ STRESS, PER_JOINT = (10.6, 4.2), 1.35
 #: Highest pressure in a joint over that of the water outside, above which water is shut in [-].
 SHUT_IN = 1.01
 MINUTE = "%Y-%m-%d %H:%M"
-#: A column for `table_of`: heading, values, units.
+#: A column for `formatted_table`: heading, values, units.
 Column = tuple[str, np.ndarray, Units]
 MILLIMETRES: Units = (("mm", 1e3),)
 
@@ -296,7 +296,7 @@ def summary_table(runs: list[RunSection]) -> Table:
         values = np.array([state.get(name, math.nan) for state in states])
         if np.isfinite(values).any():
             columns.append((head, values, units))
-    return table_of(columns)
+    return formatted_table(columns)
 
 
 def read_section(folder: Path, number: int) -> RunSection:
@@ -323,7 +323,7 @@ def run_section(folder: Path, number: int, solution: Solution) -> RunSection:
     judged = not (critical or "quake" in info)
     failures, verdict = [], UNCHECKED
     if judged:
-        failures = failures_of(result, checks)
+        failures = failure_messages(result, checks)
         verdict = FAIL if info["state"] in UNFINISHED else worst_verdict(*checks)
     elif required := requirements(case):
         state = "before failure" if critical else "after the earthquake"
@@ -361,9 +361,11 @@ def run_section(folder: Path, number: int, solution: Solution) -> RunSection:
         level=f"{last['level']:.4g} m" if last else "",
         state=state_of_last(last, info.get("quake")),
         methods=methods_table(case, checks, judged=judged),
-        notes=notes_of(checks),
+        notes=method_notes(checks),
         stress=stress_of(solution, checks),
-        summary={case.named((k,)): summary_of(check.case, check) for k, check in enumerate(checks)},
+        summary={
+            case.named((k,)): joint_summary(check.case, check) for k, check in enumerate(checks)
+        },
         computation=computation(result),
         error=discretisation_error(result),
         materials=report_input.materials(case),
@@ -470,7 +472,7 @@ def stress_of(solution: Solution, checks: list[SafetyCheck]) -> Stress:
 UNFINISHED = "failed", "interrupted"
 
 
-def failures_of(result: Results, checks: list[SafetyCheck]) -> list[str]:
+def failure_messages(result: Results, checks: list[SafetyCheck]) -> list[str]:
     """Messages on a run that failed and on requirements that are not met or not judged."""
     info = result.info
     messages = [info["statement"]] if info["state"] in UNFINISHED else []
@@ -479,7 +481,7 @@ def failures_of(result: Results, checks: list[SafetyCheck]) -> list[str]:
     return [*messages, *(f"{name}: {why}" for name, why in reasons)]
 
 
-def notes_of(checks: list[SafetyCheck]) -> list[str]:
+def method_notes(checks: list[SafetyCheck]) -> list[str]:
     """Notes on the methods: those of all joints once, others with the name of their joint."""
     lines = (
         note if common else f"{check.finite_elements.joint}: {note}"
@@ -499,7 +501,7 @@ def describe_scene(case: Case) -> str:
     return f"{size}; {plane}; joint law {law}; water in the joint: {water}"
 
 
-def summary_of(case: Case, check: SafetyCheck) -> dict[str, float]:
+def joint_summary(case: Case, check: SafetyCheck) -> dict[str, float]:
     """Values of the columns SUMMARY of a joint in SI units; case: of the joint."""
     factors = required_by_case(case)
     values = dict(check.finite_elements.numbers)
@@ -527,7 +529,7 @@ def methods_table(case: Case, checks: list[SafetyCheck], judged: bool) -> Table:
     for units, heads in SHOWN[len(levels) == 1 :]:  # a single level is in the heading
         values = [[numbers.get(n, math.nan) for _, numbers, _ in rows] for n in heads]
         columns += in_one_unit(heads.values(), np.array(values), units)
-    names, sizes, cells = table_of(columns)
+    names, sizes, cells = formatted_table(columns)
     verdicts = judged and any(r.verdict != UNCHECKED for r in results)
     first = 0 if case.of_joints else 1
     table = [
@@ -540,7 +542,7 @@ def methods_table(case: Case, checks: list[SafetyCheck], judged: bool) -> Table:
 
 
 def in_one_unit(heads: Iterable[str], values: np.ndarray, units: Units) -> Iterator[Column]:
-    """Yield columns for `table_of` that share a unit; values: (columns, rows)."""
+    """Yield columns for `formatted_table` that share a unit; values: (columns, rows)."""
     for head, column in zip(heads, values, strict=True):
         yield head, column, (unit([values[np.isfinite(values)]], units),)
 
@@ -563,7 +565,7 @@ def loads_table(rigid: GravityMethod) -> Table:
         ("distance upstream of the toe", distances, METRES),
         ("moment about the toe", np.array([r.moment for r in rows]), MOMENTS),
     ]
-    return table_of(columns).beside("load", (row.name for row in rows))
+    return formatted_table(columns).beside("load", (row.name for row in rows))
 
 
 def arm(moment: float, component: float) -> float:

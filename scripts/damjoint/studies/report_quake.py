@@ -19,7 +19,7 @@ from ..model.results import Info, column_of
 from ..pictures.drawing import BLUE, DARK, ORANGE, figure_of, panels
 from ..pictures.report_picture import Picture, bands, embedded
 from ..post import stored
-from ..post.summary import Table, table_of
+from ..post.summary import Table, formatted_table
 from . import quake_result, report_input
 
 #: Size of the picture of the spectra [inches], and their periods [s].
@@ -114,7 +114,7 @@ def record_table(rows: Columns, period: float) -> Table:
         (name, values, ((size, 1.0),))
         for (name, size), values in zip(heads, np.array(numbers).T, strict=True)
     ]
-    return table_of(columns, 3).beside("record", (name for name, _ in of_records))
+    return formatted_table(columns, 3).beside("record", (name for name, _ in of_records))
 
 
 def draw_spectra(rows: Columns, period: float) -> Figure:

@@ -24,7 +24,7 @@ from .fragility_picture import NAMES
 from .plan import FRAGILITY, beside, quantity_of
 from .plan import RECORD as SWEEP_RECORD
 from .quake_summary import INTENSITIES
-from .reliability_study import PICTURE, index_of, unit_of
+from .reliability_study import PICTURE, reliability_index, unit_of
 from .report_input import Entry
 
 #: A share below this is rounding [%].
@@ -161,19 +161,20 @@ def reliability(folder: Path, info: Mapping[str, Any]) -> dict[str, Any]:
         tables["Design point: the most probable values at failure"] = design(whole)
     path = folder / f"{info['case']}{PICTURE}"
     return {
-        "answer": answer_of(whole),
+        "answer": answer_text(whole),
         "sentences": sentences,
         "tables": tables,
         "pictures": [Picture("full", "", bands(path))] if path.is_file() else [],
     }
 
 
-def answer_of(one: Mapping[str, Any]) -> str:
+def answer_text(one: Mapping[str, Any]) -> str:
     """Probability and reliability index in a few words: of the samples, else by FORM."""
     if one["samples"]:
         low, high = one["interval"]
         share = f"P = {one['sampled']:.3g} ({low:.3g} to {high:.3g})"
-        return share + (f", beta = {index_of(one['sampled']):.3g}" if one["sampled"] else "")
+        beta = f", beta = {reliability_index(one['sampled']):.3g}" if one["sampled"] else ""
+        return share + beta
     return f"P = {one['form']:.3g}, beta = {one['beta']:.3g} (FORM)" if one["form"] else "no result"
 
 
@@ -194,10 +195,10 @@ def probabilities(of_joints: Sequence[Mapping[str, Any]]) -> Table:
         for number, (method, (share, interval)) in enumerate(methods.items()):
             joint = (one["joint"] or "all joints") if number == 0 else ""
             between = " to ".join(f"{p:.4g}" for p in interval)
-            betas = " to ".join(f"{index_of(p):.4g}" for p in reversed(interval))
+            betas = " to ".join(f"{reliability_index(p):.4g}" for p in reversed(interval))
             cells = ["-", "-", "-", "-"]
             if share:
-                cells = [f"{share:.4g}", between, f"{index_of(share):.4g}", betas]
+                cells = [f"{share:.4g}", between, f"{reliability_index(share):.4g}", betas]
             rows.append((joint, method, *cells)[0 if several else 1 :])
     within = f"{sampling.CONFIDENCE:.0%} interval"
     names = ["joint", "method", "probability", within, "beta", within]

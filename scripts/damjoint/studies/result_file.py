@@ -31,7 +31,7 @@ class ResultFile:
     @property
     def head(self) -> str:
         """Its first line."""
-        return line_of(self.columns)
+        return csv_line(self.columns)
 
     def text(self) -> str:
         """Its content. Raises InputError with the line if it is not text."""
@@ -91,7 +91,7 @@ class ResultFile:
         """
         self.check_exists()
         head = "" if os.fstat(self.number).st_size else self.head
-        rest = (head + line_of([as_text(cell) for cell in cells])).encode()
+        rest = (head + csv_line([as_text(cell) for cell in cells])).encode()
         try:
             while rest:
                 rest = rest[os.write(self.number, rest) :]
@@ -184,7 +184,7 @@ def rows_session(
             study.save_without_results(folders.COMPLETE, "", {**entries, "rows_added": study.added})
 
 
-def line_of(cells: Sequence[str]) -> str:
+def csv_line(cells: Sequence[str]) -> str:
     """A line of a CSV."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerow(cells)

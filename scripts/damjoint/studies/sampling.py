@@ -9,7 +9,7 @@ from scipy import linalg, stats
 
 from .. import InputError
 from ..arrays import Array, IntArray
-from ..input.arithmetic import call_of, explained
+from ..input.arithmetic import explained, parsed_call
 
 #: Distributions by scipy's names, and `normal`.
 DISTRIBUTIONS = {
@@ -40,7 +40,7 @@ def distribution(
     setting, rule = f"{option} {name}={text}", "must be a distribution of scipy.stats with numbers"
     message = f"{setting}: {rule}"
     try:
-        kind, numbers, named = call_of(text, unit)
+        kind, numbers, named = parsed_call(text, unit)
     except ValueError as error:
         rule += ", such as normal(1.0,0.15) or uniform(0.5,scale=0.3)"
         raise InputError(explained(setting, rule, error)) from None

@@ -16,7 +16,7 @@ from .. import InputError, RunError
 from ..input.case import Case
 from ..input.resolve import varied
 from ..model.results import Results
-from ..post.summary import Table, aligned, fitted, table_of
+from ..post.summary import Table, aligned, fitted, formatted_table
 from ..runner import compute
 from ..statics import gravity
 from ..statics.verdict import verdict
@@ -90,7 +90,7 @@ def table(runs: Sequence[tuple[str, Results | str]]) -> tuple[Table, list[str]]:
             rows.append(state_of(joint))
     columns = [(head, np.array([row[name] for row in rows]), units) for name, head, units in SHOWN]
     columns.append(("SSF", np.array([row["SSF"] for row in rows]), NUMBER))
-    cells = table_of(columns)
+    cells = formatted_table(columns)
     several = any(joint for _, joint, _ in labels)
     heads = ["run", *(["joint"] if several else [])]
     cells = Table(

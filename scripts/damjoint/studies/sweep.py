@@ -21,7 +21,7 @@ from ..input.resolve import equal_steps, resolve, with_drive_times
 from ..input.source import Source
 from ..joint.interface import Interface, interface_of
 from ..model.results import history_columns
-from ..post.folder import entries_of
+from ..post.folder import case_entries
 from ..post.summary import Draw, aligned, fitted
 from ..processes import ProcessKilled, as_finished, check_jobs, number_of
 from ..progress import Progress, track
@@ -41,9 +41,9 @@ from .plan import (
     Plan,
     Row,
     beside,
-    cases_of,
     column_of,
     in_file,
+    planned_cases,
     quantity_of,
 )
 from .quake_summary import NO_FRICTION, NOT_AT_REST, QUAKE_COLUMNS
@@ -56,7 +56,7 @@ def key_of(case: Case, plan: Plan) -> str:
     quick = sorted(QUICK.keys() & given.keys()) if plan.critical else []
     others = [bool(plan.sampled), plan.critical, quick, plan.quake and plan.quake.listed]
     if plan.quake:
-        others.append(record_files.content_of(case.record, case.record_vertical))
+        others.append(record_files.record_bytes(case.record, case.record_vertical))
     return keys.key_of(case, *others)
 
 
@@ -141,7 +141,7 @@ def last_row(task: Task, solved: Solved) -> dict[str, Value]:
             return row | dict(zip(OUTCOME, (1.0, mode, why), strict=True))
         result = stepped(task.case, solved, interface).results()
     except Exception as error:
-        return row | dict(zip(OUTCOME, (1.0, ERROR, message_of(error)), strict=True))
+        return row | dict(zip(OUTCOME, (1.0, ERROR, error_message(error)), strict=True))
     outcome = float(failed(result)), verdict(result), statement(result)
     return row | result.last | dict(zip(OUTCOME, outcome, strict=True))
 
@@ -160,7 +160,7 @@ def quake_row(task: Task, limits: Limits) -> dict[str, Value]:
     try:
         static, summary = quake.outcome_of(case)
     except Exception as error:
-        return row | dict(zip(OUTCOME, (1.0, ERROR, message_of(error)), strict=True))
+        return row | dict(zip(OUTCOME, (1.0, ERROR, error_message(error)), strict=True))
     row |= static.results().last | quake_summary.columns(case, summary)
     verdict, words = quake_summary.verdict(case, summary), quake_summary.statement(case, summary)
     exceeded = [kind for kind, limit in limits.listed if exceeds(row, verdict, kind, limit)]
@@ -188,7 +188,7 @@ def exceeds(row: Mapping[str, Value], verdict: str, kind: str, limit: float) -> 
     return True if kind == "slip" and slip > limit else False if at_rest else None
 
 
-def message_of(error: Exception) -> str:
+def error_message(error: Exception) -> str:
     """The message of an error in one line."""
     kind = "" if isinstance(error, RunError) else f"{type(error).__name__}: "
     return " ".join(f"{kind}{error}".split())
@@ -201,7 +201,7 @@ def critical_value(task: Task) -> dict[str, Value]:
     try:
         answer = task.search().find()
     except Exception as error:
-        return dict(zip(task.columns, ("", "", 0.0, message_of(error)), strict=True))
+        return dict(zip(task.columns, ("", "", 0.0, error_message(error)), strict=True))
     value = "" if answer.value is None else answer.value
     cells = value, answer.mode, float(answer.confirmed), answer.why or answer.doubt
     return dict(zip(task.columns, cells, strict=True))
@@ -209,7 +209,7 @@ def critical_value(task: Task) -> dict[str, Value]:
 
 def planned(case: Case, plan: Plan) -> Iterator[tuple[str, Values, Task]]:
     """Key, values and task of each row of a plan. Raises InputError."""
-    for row, varied in cases_of(case, plan):
+    for row, varied in planned_cases(case, plan):
         search = partial(search_of, varied, plan.critical) if plan.critical else None
         if plan.quake:
             quake.check(varied)
@@ -250,11 +250,11 @@ def spread(
     tasks: dict[str, Task], jobs: int, scheduler: str | None
 ) -> Iterator[tuple[str, dict[str, Value]]]:
     """(key, row) of each finished task of a sweep, see `spread_bundles`."""
-    with client_of(scheduler) as client:
+    with scheduler_client(scheduler) as client:
         yield from spread_bundles(last_rows, bundles(tasks), tasks, jobs, client)
 
 
-def client_of(scheduler: str | None) -> Any:
+def scheduler_client(scheduler: str | None) -> Any:
     """A client of dask of a scheduler at an address, None without one. Raises InputError."""
     if not scheduler:
         return contextlib.nullcontext()
@@ -340,7 +340,7 @@ class PlannedRows:
         about = {"rows": len(self.planned), "vary": plan.varied, "sample": [*plan.sampled]}
         limits = plan.quake and plan.quake.listed
         about |= {"tie": plan.tied, "critical": plan.critical, "limits": limits}
-        return {"sweep": about, **entries_of(case)}
+        return {"sweep": about, **case_entries(case)}
 
     def missing(self, known: Container[str] = ()) -> dict[str, Task]:
         """The tasks of the rows whose keys are not known."""

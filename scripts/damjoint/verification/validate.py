@@ -28,7 +28,7 @@ def chosen(names: Sequence[str]) -> dict[str, list[str]]:
         if name in FAMILIES:
             tests[name] = tests_of(name)
         else:
-            tests.setdefault(family_of(name), []).append(name)
+            tests.setdefault(published_family(name), []).append(name)
     return tests
 
 
@@ -56,7 +56,7 @@ def tests_without_case(family: str, engine: str) -> dict[str, Callable[[], dict[
     return tests
 
 
-def family_of(name: str) -> str:
+def published_family(name: str) -> str:
     """The family of a case. Raises InputError if the case has no published numbers."""
     references = validation.references(load(name))
     if not references:

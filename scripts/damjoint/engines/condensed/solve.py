@@ -48,7 +48,7 @@ def about(bulk: Condensed) -> Info:
     }
 
 
-def threads_of(case: Case) -> int | None:
+def thread_number(case: Case) -> int | None:
     """Number of threads that solve a case fastest; None: all."""
     return 1 if case.geometry or joint_size(case) < THREADED_UNKNOWNS else None
 
@@ -72,7 +72,7 @@ def solve(case: Case, on_step: OnStep, _fields: bool, engine: str = "auto") -> I
 
     engine: see `engine_of`; where the iteration of auto stalls, the bodies are condensed.
     """
-    with limited_threads(threads_of(case)):
+    with limited_threads(thread_number(case)):
         start = time.perf_counter()
         bulk, assembled = condensed_bodies(case, engine)
         before = bulk.seconds if assembled else {"cache": time.perf_counter() - start}

@@ -9,7 +9,7 @@ from ...input.case import Case
 from ...input.parameters import in_rows, listing
 from ...mesh.joint_mesh import JointMesh
 from ...mesh.mesh import Mesh
-from ...model.network import HigherHeel, Network, PathDrains, WaterPath, networks_of, plane_paths
+from ...model.network import HigherHeel, Network, PathDrains, WaterPath, plane_paths, water_networks
 
 
 def values_of_paths(mesh: Mesh, case: Case) -> list[str]:
@@ -19,7 +19,7 @@ def values_of_paths(mesh: Mesh, case: Case) -> list[str]:
     """
     alone = [WaterPath.of(joint) for joint in case.joints]
     texts = [text_of(path) if path else "" for path in alone]
-    for network in networks_of(mesh.joints, case.joints):
+    for network in water_networks(mesh.joints, case.joints):
         solid = mesh.dim == 3
         paths = side_by_side(network, mesh, case) if solid else in_plane(network, mesh, case)
         first = case.joints[network.numbers[0]]
