@@ -7,6 +7,7 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import damjoint as dj
 import matplotlib.image
@@ -26,6 +27,7 @@ from damjoint.studies.check import (
     by_gravity,
     compare_joints,
     hand_calculation,
+    worst_verdict,
 )
 from damjoint.studies.check_study import picture_content
 from damjoint.studies.check_tables import labelled_notes, picture_table, text_table
@@ -670,3 +672,15 @@ def test_factors_by_friction_are_named_where_the_law_has_none(tmp_path, capsys):
     assert cli.main(["check", "dam", "--levels=20", *settings, f"--out={tmp_path}"]) == 0
     strength = "SSF with mu = 0.8, adhesion = 200000 Pa, which the law mixed does not have"
     assert strength in capsys.readouterr().out
+
+
+def test_joints_of_which_nothing_is_required_do_not_count_beside_others():
+    """As a joint between blocks that other joints hold."""
+
+    def check(*verdicts):
+        return SimpleNamespace(results=[SimpleNamespace(verdict=v) for v in verdicts])
+
+    assert worst_verdict(check("pass", "pass"), check("not checked")) == "pass"
+    assert worst_verdict(check("not checked")) == "not checked"
+    assert worst_verdict(check("pass", "not judged"), check("not checked")) == "not judged"
+    assert worst_verdict(check("pass"), check("not judged", "fail")) == "fail"
