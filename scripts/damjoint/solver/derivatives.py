@@ -712,12 +712,12 @@ class SidesInStep:
                 )
                 gaps[k] = (low - high) / self.sides.distance[k]
         if base.case["drive"] != "level":
-            values = self.sides.drive_from + self.driven
+            values = self.sides.drive_from + self.prescribed_share
             gaps += (values[number:] - values[:number]) / self.sides.distance
         return np.asarray(gaps)
 
     @property
-    def driven(self) -> Array:
+    def prescribed_share(self) -> Array:
         """What the case adds to the prescribed displacement at the beginning [m], of the sides."""
         case = self.sides.model.case
         begin, end = case["drive_begin"], case["drive_end"]
