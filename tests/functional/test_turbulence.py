@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from damjoint import InputError
 from damjoint.input.resolve import load
+from damjoint.joint import turbulence
 from damjoint.joint.flow_in_time import TimeStep
-from damjoint.joint.turbulence import CRITICAL
+from damjoint.joint.turbulence import CRITICAL, slowed
 from damjoint.model.loads import Loading
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.solver.model import Model
@@ -90,6 +91,33 @@ def test_the_derivative_is_that_of_finite_differences(model, seconds):
     jump = wedge(model, 2e-3 if seconds else 1e-2)
     slowed = check_derivative(model, jump, 0.99, 1e-10, seconds)
     assert slowed.min() < 0.57  # in part turbulent
+
+
+def test_newton_finds_the_flow_of_the_secants(model, monkeypatch):
+    """Of a film that closes, is squeezed out and has voids where it opens; in fewer solutions."""
+    (system,), variables = model.equilibrium.flowing, model.start().variables
+    loading, closes = Loading(30.0, 0.0), wedge(model, 5e-3)
+    numbers = []
+    for jump in 0.99 * closes, closes + wedge(model, 2e-3):
+        begin = system.stored_at(closes, variables, loading, 0.0)
+        step = TimeStep(seconds=5e-3, begin=begin)
+        found = []
+        for solve in turbulence.by_newton, lambda *given: None:
+            calls = []
+            counted = lambda *given, calls=calls: calls.append(given) or slowed(*given)
+            system.last_solution = None
+            system.last_slowed.clear()
+            with monkeypatch.context() as patch:
+                patch.setattr(turbulence, "by_newton", solve)
+                patch.setattr(turbulence, "slowed", counted)
+                found.append((system.solve(jump, variables, loading, None, step), len(calls)))
+        (newton, few), (secants, many) = found
+        scale = np.abs(secants.pressure).max()
+        assert newton.pressure == pytest.approx(secants.pressure, abs=1e-9 * scale)
+        assert newton.systems[0].slowed.min() < 0.57
+        numbers.append((few, many))
+    few, many = np.sum(numbers, axis=0)
+    assert few < many
 
 
 def test_it_resists_more():

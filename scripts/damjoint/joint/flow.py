@@ -403,6 +403,18 @@ class Flow:
         by_element = np.bincount(self.points.elements, conductivity)
         return self.lengths**2 / by_element
 
+    def outflow_of(self, flux: list[Array]) -> Array:
+        """2D: what flows out of the nodes (n,) by a flux times weights at the Gauss points (q,),
+        along each of JointFields.axes.
+        """
+        along = np.asarray(sum(f * t for f, t in zip(flux, self.towards, strict=True)))
+        by_element = np.bincount(self.points.elements, along) / self.lengths
+        out = np.zeros(self.fields.nodes)
+        for cells, nodes in self.lines:
+            np.add.at(out, nodes[:-1], by_element[cells])
+            np.add.at(out, nodes[1:], -by_element[cells])
+        return out
+
     def _cut_lines(self, mask: bytes) -> Pieces:
         known, pieces = np.frombuffer(mask, bool), []
         for cells, nodes in self.lines:

@@ -138,16 +138,20 @@ class WaterBalance:
         known: BoolArray,
         dry: BoolArray,
         guess: BoolArray,
+        beyond: Array | None = None,
     ) -> FlowInTime:
         """Solve for conductivities w^3/(12 visc) times weights (q,), and heads times the water's
         weight (n,) [Pa] where they are known; imposed: as in `Flow.solve`; dry: ends of these;
-        guess: where the search for voids begins (n,).
+        guess: where the search for voids begins (n,); beyond: what flows out of the nodes beside
+        the flow of these conductivities (n,) [m3/s], None: nothing.
 
         nan if no set of nodes with voids is found.
         """
         seconds, begin = self.step.seconds, self.step.begin
         ground, before = self.storage / seconds, begin.volume
         rest = before - self.volume + self.storage * self.elevation
+        if beyond is not None:
+            rest = rest - seconds * beyond
         voids, air = guess & ~known, guess & dry
         lacking = np.zeros(len(heads))
         for sets in range(MOST_SETS):
@@ -164,6 +168,8 @@ class WaterBalance:
             pressure = total - self.elevation
             excess = self.volume + self.storage * pressure - before
             excess += seconds * (system.outflow(total, source) - lacking)
+            if beyond is not None:
+                excess += seconds * beyond
             largest = np.abs(total).max()
             suction = pressure < self.lowest - ROUNDING * largest
             least = self.volume + np.abs(before) + seconds * system.diagonal * largest

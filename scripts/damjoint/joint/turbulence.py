@@ -7,6 +7,8 @@ cubic law, the flux is that of the cubic law times (2041 / R)^(3/7) where R > 20
 
 The flow is solved by secant conductivities: the flux of the last iterate over its gradient. That
 converges by a factor of 3/7 or less, and faster by Anderson's extrapolation [J. ACM 12, 1965].
+In a level joint in 2D, where water is stored, the iterations after the first one are Newton's: the
+flux is linear about that of the last iterate, and the voids are those of this linear flow.
 """
 
 from __future__ import annotations
@@ -25,8 +27,10 @@ CRITICAL = (96 / 0.316) ** (4 / 3)
 EXPONENT = 4 / 7
 #: Change of the logarithm of a conductivity in an iteration, at convergence [-].
 TOLERANCE = 1e-11
-#: Iterations at most; usually about ten.
-ITERATIONS = 100
+#: The same of Newton's iterations, which square it.
+NEWTON_TOLERANCE = 1e-7
+#: Iterations at most; usually about ten. Of these by Newton's method; usually two.
+ITERATIONS, NEWTON_ITERATIONS = 100, 8
 #: Differences that the extrapolation uses.
 DEPTH = 4
 
@@ -44,16 +48,18 @@ def turbulent_flow(
     conductivity: Array,
     per_gradient: Array,
     guess: Array | None,
+    solve_linear: Callable[[Array, list[Array]], FlowSolution] | None = None,
 ) -> tuple[FlowSolution, Array]:
     """The solution, and the flux over that of the cubic law (q,).
 
     solve: the flow of conductivities (q,), as in `FlowSystem.inverse_of`; conductivity: those of
-    the cubic law; guess: of that ratio, on which the result does not depend.
+    the cubic law; guess: of that ratio, on which the result does not depend; solve_linear: the flow
+    of conductivities and a flux (q,) along the axes of the gradients; None: no Newton's method.
     nan if it does not converge.
     """
     log = np.zeros(len(conductivity)) if guess is None else np.log(guess)
     before: list[tuple[Array, Array]] = []
-    for _ in range(ITERATIONS):
+    for number in range(ITERATIONS):
         share = np.exp(log)
         solution = solve(conductivity * share)
         if not solution.systems:
@@ -63,6 +69,10 @@ def turbulent_flow(
         change = np.log(new) - log
         if not np.isfinite(change).all():
             break
+        if number == 0 and solve_linear and np.abs(change).max() >= TOLERANCE:
+            found = by_newton(solve_linear, conductivity, per_gradient, system.gradients)
+            if found:
+                return found
         if np.abs(change).max() < TOLERANCE:
             if (new < 1).any():
                 system = with_tangent(system, conductivity, share, new < 1)
@@ -71,6 +81,33 @@ def turbulent_flow(
         log = np.minimum(extrapolated(before), 0)
     nothing = np.full(len(solution.pressure), np.nan)
     return replace(solution, pressure=nothing, systems=[]), np.ones(len(log))
+
+
+def by_newton(
+    solve_linear: Callable[[Array, list[Array]], FlowSolution],
+    conductivity: Array,
+    per_gradient: Array,
+    gradients: list[Array],
+) -> tuple[FlowSolution, Array] | None:
+    """As `turbulent_flow` by Newton's method from gradients; None if it does not converge."""
+    share = slowed(gradients, per_gradient)
+    for _ in range(NEWTON_ITERATIONS):
+        tangent = np.where(share < 1, EXPONENT * share, 1)
+        beyond = conductivity * (tangent - share)  # of the flux, against the gradient
+        solution = solve_linear(conductivity * tangent, [beyond * g for g in gradients])
+        if not solution.systems:
+            return None
+        (system,) = solution.systems
+        new = slowed(system.gradients, per_gradient)
+        change = np.abs(np.log(new) - np.log(share)).max()
+        if change < NEWTON_TOLERANCE:
+            turbulent = (share < 1).any()
+            system = replace(system, slowed=tangent) if turbulent else system
+            return replace(solution, systems=[system]), new
+        if not np.isfinite(change):
+            return None
+        share, gradients = new, system.gradients
+    return None
 
 
 def with_tangent(

@@ -559,9 +559,10 @@ class WaterSystem:
         at_ends: Array,
         drains: IntArray,
         drained: Array,
-    ) -> Callable[[Array], FlowInTime]:
+    ) -> Callable[..., FlowInTime]:
         """As `Flow.solve` at the end of a time step, see flow_in_time.py, as a function of
-        w^3/(12 visc) times weights (q,); factors: see `volume_by`. The pressure at a dry end is 0.
+        w^3/(12 visc) times weights (q,) and, in 2D, of a flux beside it as in `Flow.outflow_of`;
+        factors: see `volume_by`. The pressure at a dry end is 0.
         """
         ends, elevation = self.fields.ends, self.elevation
         heads, (known, dry) = at_ends.copy(), np.zeros((2, len(at_ends)), bool)
@@ -579,9 +580,10 @@ class WaterSystem:
             lowest=self.members[0].case["pressure_min"],
         )
 
-        def flow_by(conductivity: Array) -> FlowInTime:
+        def flow_by(conductivity: Array, flux: list[Array] | None = None) -> FlowInTime:
             guess = self.last_voids.get(like, step.begin.void) > 0
-            solution = balance.solve(conductivity, imposed, heads, known, dry, guess)
+            beyond = None if flux is None else self.flow.outflow_of(flux)
+            solution = balance.solve(conductivity, imposed, heads, known, dry, guess, beyond)
             self.last_voids[like] = solution.void
             return solution
 
@@ -728,11 +730,15 @@ class FlowAtLoading:
         first joint; nodes, outlet: of drains, see `outlets`; step: see `WaterSystem.solve`.
         """
         system, drained = self.system, self.system.unit_weight * outlet
-        flow_by = (
+        in_time = (
             system.flow_in_time(step, self.factors, self.imposed, self.at_ends, nodes, drained)
             if step
-            else lambda conductivity: self.steady(conductivity, nodes, drained)
+            else None
         )
+
+        def flow_by(conductivity: Array) -> FlowSolution:
+            return in_time(conductivity) if in_time else self.steady(conductivity, nodes, drained)
+
         laminar = (system.reference if step else 1) * conductivity
         if not system.turbulent.any():
             return flow_by(laminar)
@@ -740,8 +746,13 @@ class FlowAtLoading:
         per_gradient = 2 * system.reference * conductivity / system.flow.points.weights
         per_gradient *= system.members[0].case["rho_water"] / system.members[0].case["visc"]
         per_gradient *= system.turbulent
+        level = system.flow.dim == 2 and np.ptp(system.elevation) <= ROUNDING * system.unit_weight
         solution, system.last_slowed[like] = turbulent_flow(
-            flow_by, laminar, per_gradient, system.last_slowed.get(like)
+            flow_by,
+            laminar,
+            per_gradient,
+            system.last_slowed.get(like),
+            in_time if level else None,
         )
         return solution
 
