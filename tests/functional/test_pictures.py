@@ -19,7 +19,7 @@ from damjoint.mesh.body import Body
 from damjoint.pictures import run_picture as pictures
 from damjoint.pictures.drawing import runs_of, widen
 from damjoint.pictures.drawing_process import DrawingProcess, joined
-from damjoint.pictures.scene import water_surface
+from damjoint.pictures.scene import state_label, water_surface
 from damjoint.statics import gravity
 from damjoint.studies import critical_picture
 from damjoint.studies.critical_value import CriticalValue
@@ -348,6 +348,18 @@ def test_a_picture_says_verdict_loads_factor_and_position(figures, runs):
     )
     where = gravity.position(result.last["x_resultant"], result.case.joint_length)
     assert f"SSF {factor:.3g}, N' at {result.last['x_resultant']:.3g} m: {where}" in facts
+
+
+def test_a_factor_below_one_of_an_equilibrium_is_explained():
+    """With bond T is at most the friction under the compression and the cohesion that is left; the
+    tension of the joint lowers N' alone.
+    """
+    case = load("dam", {"mu": 0.8, "adhesion": 2e5})
+    state = {"N": 12e6, "T": 13e6, "U": 9e6, "bonded_length": 17.0, "x_resultant": 31.0}
+    known = (0.8 * 12e6 + 2e5 * 17.0) / 13e6
+    above, below = state_label(case, state), state_label(case, state | {"T": 14e6})
+    assert f"SSF {known:.3g}" in above and "SSF < 1" not in above
+    assert "SSF < 1: N' is less the joint's tension" in below
 
 
 def test_the_step_of_the_earthquake_is_marked_where_the_level_stands_twice(runs):

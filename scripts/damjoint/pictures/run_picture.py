@@ -619,7 +619,8 @@ def draw_directions(axes: Axes, level: str) -> None:
         x, y = start + 0.135 * direction
         axes.text(x, y, name, transform=axes.transAxes, ha="center", va="center", fontsize=8)
     words = f"behind the dam, upstream: reservoir, {level}" if level else "upstream behind the dam"
-    axes.text(0.02, 0.97, words, transform=axes.transAxes, fontsize=8, va="top")
+    behind = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}
+    axes.text(0.02, 0.97, words, transform=axes.transAxes, fontsize=8, va="top", bbox=behind)
 
 
 def view_from(azimuth: float, elevation: float) -> np.ndarray:

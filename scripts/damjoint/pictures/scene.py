@@ -138,7 +138,11 @@ def state_label(case: Case, state: Mapping[str, float]) -> str:
     acting = (
         f"N' at {state['x_resultant']:.3g} m: {where}" if np.isfinite(state["x_resultant"]) else ""
     )
-    return ", ".join(filter(None, [*forces, f"SSF {factor:.3g}" if known else "", acting]))
+    label = ", ".join(filter(None, [*forces, f"SSF {factor:.3g}" if known else "", acting]))
+    plain = case["factor_mu"] == case["factor_c"] == 1
+    if case["law"] == "bond" and case["sigma_max"] > 0 and plain and factor < 1:
+        label += "; SSF < 1: N' is less the joint's tension, friction acts under its compression"
+    return label
 
 
 def level_label(level: float) -> str:
