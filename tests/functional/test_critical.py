@@ -22,6 +22,7 @@ from closed_forms import (
 from damjoint import RunError, runner
 from damjoint.input.resolve import load, varied
 from damjoint.solver import path
+from damjoint.solver.path import FALL
 from damjoint.statics import gravity
 from damjoint.statics.verdict import highest_by_statics, verdict
 from damjoint.studies import failure_path
@@ -411,7 +412,9 @@ def test_bad_input_is_refused(command, tmp_path, words, message):
 
 
 @pytest.mark.heavy
-def test_a_level_beyond_unstable_growth_is_not_confirmed_if_other_ways_do_not_lead_there():
+def test_a_level_beyond_unstable_growth_is_not_confirmed_if_other_ways_do_not_lead_there(
+    monkeypatch,
+):
     """Random dam 112-5, from a lower first level: the crack of a lift runs through from 8.002 m;
     the friction beyond it bears 8.505 m, which was confirmed beside 8.002 m.
     """
@@ -444,7 +447,15 @@ def test_a_level_beyond_unstable_growth_is_not_confirmed_if_other_ways_do_not_le
         "drain_x": (1.43, 0.417, 0.59),
         "softening": "exponential",
     }
+    ways, follow = [], Search.from_beginning
+
+    def recorded(self, path, share=1.0, unstable_fall=FALL, case=None):
+        ways.append((id(path), share, unstable_fall, case and case.levels))
+        return follow(self, path, share, unstable_fall, case)
+
+    monkeypatch.setattr(Search, "from_beginning", recorded)
     _, answer = search_result("dam", "level", settings, [2.285], "1.07")
+    assert len(set(ways)) == len(ways) > 1  # no way proves anything twice
     assert answer.value > 8.49 and not answer.confirmed
     assert answer.doubt.startswith("between ")
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import chain, zip_longest
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from scipy.optimize import bisect
@@ -79,6 +79,9 @@ AFTER = {"by displacement": False, "by relaxation": True}
 
 #: Relative distance within which the bound of statics confirms a critical level below it.
 NEAR_BOUND = 0.02
+
+#: Arguments of `Search.from_beginning`: how a path is followed otherwise.
+Way: TypeAlias = dict[str, Any]
 
 #: The smallest value of a parameter that has to be positive.
 TINY = 1e-30
@@ -299,13 +302,14 @@ class Search:
             return CriticalValue(
                 None, "", "", f"there is an equilibrium at {beyond}", path.points[-1]
             )
+        whole = path if repeats_whole(path) else None
         point = path.points[path.top] if path.admissible else None
         after, ends = dict[str, float](), grows and path.ended
         if point and grows:
             first, (after, path) = path, self.after_growth(path)
             # the growth of a single point may be passed over
             if certain and (after or first.releases_shear):
-                other = self.otherwise(first)
+                other = self.otherwise(first, ways_over_growth(first, whole is first))
                 certain = other is None
         result = self.result(point.level if point else None, path, point)
         if point is None:
@@ -314,17 +318,12 @@ class Search:
             mode = "unstable crack growth" if after else result.mode
             result = replace(result, mode=mode, why=beyond_limit(path), doubt="", after=after)
             result = replace(result, growth=point.level)
-        elif not result.why:
-            result = with_end_of(path, result)
-            if (
-                path.entering and path.branch_ends and certain
-            ):  # each point that the water reaches turns the path
-                other = self.from_beginning(path, share=1.0, case=lower_begin(path.case))
+        else:
+            ways = further_ways(path, whole is path, mechanism=bool(result.why))
+            result = result if result.why else with_end_of(path, result)
+            if result.why and certain:
+                other = self.otherwise(path, ways)
                 certain = other is None
-        beyond_growth = not path.to_growth and path.growth_until(path.top + 1) is not None
-        if beyond_growth and result.why and certain:  # another way may end before that growth
-            other = self.otherwise(path)
-            certain = other is None
         if path.begun_by_run and point is path.points[0]:
             result = replace(result, why="", doubt=falls_at_once(point))
         if path.water_withdraws:
@@ -339,35 +338,29 @@ class Search:
         else, and where water enters the crack and no mechanism is found, from the beginning on.
         None if they lead to the same highest level.
         """
-        lost = path.entering and (path.stops or path.water_withdraws)
-        if lost or (path.starts and path.top >= path.starts[0]):
-            return self.from_beginning(path)
+        if repeats_whole(path):
+            return self.from_beginning(path, SHORTER_RISE)
         other = path.repeated()
         if other:
             self.trials[-1] = replace(self.trials[-1], path=other)
         return other
 
-    def otherwise(self, path: FailurePath) -> FailurePath | None:
-        """The first path that leads to another highest level, of those by shorter increments, with
-        another fall of the level as unstable growth, and of one that begins at a lower level; None
-        if all lead to the same.
+    def otherwise(self, path: FailurePath, ways: Sequence[Way]) -> FailurePath | None:
+        """The first path that leads to another highest level, of those by other ways; None if all
+        lead to the same.
         """
-        falls = FALL / FALL_FACTOR, FALL * FALL_FACTOR
-        ways: list[dict[str, Any]] = [{"share": SHORTER_RISE}]
-        ways += [{"share": 1.0, "unstable_fall": fall} for fall in falls]
-        ways += [{"share": 1.0, "case": lower_begin(path.case)}]
         paths = (self.from_beginning(path, **way) for way in ways)
         return next((other for other in paths if other), None)
 
     def from_beginning(
         self,
         path: FailurePath,
-        share: float = SHORTER_RISE,
+        share: float = 1.0,
         unstable_fall: float = FALL,
         case: Case | None = None,
     ) -> FailurePath | None:
-        """The path by shorter increments from its beginning on, to the first unstable growth if it
-        is; None if they lead to the same highest level.
+        """The path by another way from its beginning on, to the first unstable growth if it is;
+        None if it leads to the same highest level.
 
         share: of the level's rise that an increment aims at; unstable_fall: relative fall of the
         level that is unstable growth; case: with other levels.
@@ -670,6 +663,34 @@ def with_end_of(path: FailurePath, result: CriticalValue) -> CriticalValue:
     if path.stops and path.loses_drains:
         return replace(result, doubt=end_at_drains(path))
     return replace(result, why=end_of_branch(path), doubt="") if path.branch_ends else result
+
+
+def repeats_whole(path: FailurePath) -> bool:
+    """Whether a path is repeated from its beginning on: where the level is that after the end of a
+    branch, or water enters the crack and no mechanism is found.
+    """
+    lost = path.entering and (path.stops or path.water_withdraws)
+    return lost or bool(path.starts and path.top >= path.starts[0])
+
+
+def ways_over_growth(path: FailurePath, repeated: bool) -> list[Way]:
+    """Ways that may end at another unstable growth: by shorter increments, unless the path has been
+    repeated so, with another fall of the level that counts as growth, and from a lower level.
+    """
+    ways: list[Way] = [] if repeated else [{"share": SHORTER_RISE}]
+    ways += [{"unstable_fall": fall} for fall in (FALL / FALL_FACTOR, FALL * FALL_FACTOR)]
+    return [*ways, {"case": lower_begin(path.case)}]
+
+
+def further_ways(path: FailurePath, repeated: bool, mechanism: bool) -> list[Way]:
+    """Ways that confirm a highest level, beside shorter increments: beyond unstable growth those
+    over it; where a branch ends and water enters the crack, each point of which turns the path,
+    from a lower level. repeated: see `ways_over_growth`; mechanism: whether one confirms it.
+    """
+    if not path.to_growth and path.growth_until(path.top + 1) is not None:
+        return ways_over_growth(path, repeated)
+    ends = path.entering and path.branch_ends and not mechanism
+    return [{"case": lower_begin(path.case)}] if ends else []
 
 
 def lower_begin(case: Case) -> Case:
