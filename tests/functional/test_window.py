@@ -618,6 +618,7 @@ def test_buttons_pressed_during_a_run_act_after_it(open_window, tmp_path):
     assert (tmp_path / "c" / "joint.csv").exists()
 
 
+@pytest.mark.heavy
 def test_stop_keeps_the_converged_steps(open_window, tmp_path):
     user = open_window("e", **SMALL)
     user.type(tree.STEPS, "200")
