@@ -147,6 +147,13 @@ def test_sobol_indices_of_a_function_with_an_interaction():
     assert (first_width > 0).all() and (total_width < 0.1).all()
 
 
+def test_sobol_indices_of_an_outcome_that_seldom_differs_have_no_interval(recwarn):
+    """Samples that are drawn again may have one value only; scipy's warnings were printed."""
+    design = sampling.sobol_design(32, 2, seed=0)
+    first, total, *widths = sampling.sobol_indices(np.maximum(design[:, 0] - 0.97, 0.0), 2)
+    assert np.isfinite([first, total]).all() and np.isnan(widths).any() and not recwarn.list
+
+
 def test_the_design_of_sobol_indices_has_blocks_of_a_power_of_two():
     sample = Sample(4, {"mu": "uniform(0.5,0.2)", "adhesion": "uniform(1e4,1e4)"}, "sobol")
     assert len(sample.values()["mu"]) == sample.rows == 4 * 4

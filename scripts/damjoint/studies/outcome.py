@@ -97,6 +97,6 @@ def report(plan: Plan, rows: list[Row], out: Path) -> str:
         named.append((STATISTICS[-1], title, shares))
     for ending, title, table in named:
         write_rows(beside(out, ending), table)
-        cells = [{n: "-" if v != v else v for n, v in row.items()} for row in table]  # nan
-        texts.append(f"{title}\n{tabulate(cells, 'keys', floatfmt='.4g')}")
+        cells = [{n: None if v != v else v for n, v in row.items()} for row in table]  # nan
+        texts.append(f"{title}\n{tabulate(cells, 'keys', floatfmt='.4g', missingval='-')}")
     return "\n\n".join(texts)

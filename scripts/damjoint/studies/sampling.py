@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Literal
 
 import numpy as np
@@ -113,13 +114,16 @@ def sobol_design(number: int, inputs: int, seed: int) -> Array:
 
 def sobol_indices(outcome: Array, inputs: int) -> tuple[Array, Array, Array, Array]:
     """Sobol's indices of first order and total ones (inputs,), and half of the width of their
-    intervals by bootstrap, of the outcomes of `sobol_design`.
+    intervals by bootstrap, of the outcomes of `sobol_design`; nan: the outcomes that are drawn
+    again, few of which differ, may all be the same.
     """
     first, second, *mixed = np.split(outcome[None, :], inputs + 2, axis=1)
     blocks: dict[Literal["f_A", "f_B", "f_AB"], Array]
     blocks = {"f_A": first, "f_B": second, "f_AB": np.array(mixed)}
-    result = stats.sobol_indices(func=blocks, n=first.shape[1])
-    again = result.bootstrap(confidence_level=CONFIDENCE)
+    with np.errstate(invalid="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
+        result = stats.sobol_indices(func=blocks, n=first.shape[1])
+        again = result.bootstrap(confidence_level=CONFIDENCE)
     intervals = again.first_order.confidence_interval, again.total_order.confidence_interval
     widths = [np.ravel(interval.high - interval.low) / 2 for interval in intervals]
     return np.ravel(result.first_order), np.ravel(result.total_order), widths[0], widths[1]
