@@ -357,6 +357,21 @@ def test_a_run_beyond_the_limit_has_the_derivatives_of_its_last_equilibrium():
     assert [row.level for row in rows] == [30, pytest.approx(history(case)["level"])]
 
 
+def test_a_derivative_that_is_not_found_is_said(command, tmp_path):
+    """The limits of dams of other widths are at other levels."""
+    words = "run", "dam", "--set", "n_joint=6", "--set", "order=1", "--set", "law=friction"
+    names = "--levels", "30,80", "--sensitivity", "dam_base,rho_dam"
+    _, out, _ = command(*words, *names, "--no-picture", "--no-fields", "--out", "out")
+    table = rows_of(tmp_path / "out/sensitivity.csv")
+    of_base = [row for row in table if row["parameter"] == "dam_base"]
+    assert [np.isfinite(float(row["N"])) for row in of_base] == [True, False]
+    assert (
+        of_base[1]["level"] == next(r for r in table[::-1] if r["parameter"] != "dam_base")["level"]
+    )
+    assert "sensitivity: no derivative with dam_base is found" in out and "no effect" not in out
+    assert any(line.startswith("rho_dam") for line in out.splitlines())
+
+
 def test_the_factors_of_a_check(command, tmp_path):
     words = "check", "dam", "--set", "n_joint=10", "--levels", "30", "--out", "out"
     code, out, _ = command(*words, "--sensitivity", "mu,dam_base")

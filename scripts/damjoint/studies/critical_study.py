@@ -86,11 +86,14 @@ def derivative_lines(
     )
     printed = (("critical_level", "m", 1.0),)
     changes = sensitivities.changes(rows, printed, deviations=deviations)
+    lines = sensitivities.without_lines(
+        *sensitivities.without_change(rows, changes, deviations or names)
+    )
     if not changes:
-        return [sensitivities.no_effect(deviations or names)]
+        return lines
     case = replace(point.model.case, name=name)
     sensitivities.draw_changes(changes, case, point.level, out)
-    return [sensitivities.text(changes)]
+    return [sensitivities.text(changes), *lines]
 
 
 def table(search: Search) -> dict[str, np.ndarray]:

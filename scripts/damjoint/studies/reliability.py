@@ -221,7 +221,7 @@ def rates_of(answer: CriticalValue, names: list[str]) -> dict[str, Value]:
         rows = of_point(answer.point, names)
     except (InputError, RunError, np.linalg.LinAlgError):
         return {}
-    if any(row.kink for row in rows):
+    if any(row.kink or not row.derivatives for row in rows):
         return {}
     return {rate_column(row.name): row.derivatives["critical_level"] for row in rows}
 

@@ -29,7 +29,7 @@ from ..solver.derivatives import (
     half_difference,
     history_row,
 )
-from ..solver.load_stepper import LoadStepper
+from ..solver.load_stepper import SAME_TIME, LoadStepper
 from ..solver.path import Point
 from ..statics.gravity import factors_of_state, with_crack
 from ..threads import limited_threads
@@ -106,7 +106,7 @@ OF_GEOMETRY = 5e-3
 class Sensitivity:
     """Derivatives with a parameter, per its unit, by column; kink: whether a point of the joint is
     about to open, to slip or to break, so that they are those for a larger value (a smaller one at
-    the parameter's maximum); of_runs: whether they are differences of two runs.
+    the parameter's maximum); of_runs: whether they are differences of two runs. None: not found.
     """
 
     name: str
@@ -241,9 +241,8 @@ def of_run(case: Case, names: Sequence[str]) -> list[Sensitivity]:
                     noise = {c: NOISE * abs(sizes[c] / (value or 1)) for c in columns}
                     kink = differ(row, other, noise)
                     row = other if kink else row
-                if row:
-                    at = float(state.time), float(state.loading.level)
-                    rows.append(Sensitivity(name, value, *at, row, kink))
+                at = float(state.time), float(state.loading.level)
+                rows.append(Sensitivity(name, value, *at, row, kink))
         for name in others:
             rows += of_two_runs(stepper, name, columns)
     return rows
@@ -296,8 +295,8 @@ def values_of_sides(step: SidesInStep) -> dict[str, Array]:
 
 
 def of_two_runs(stepper: LoadStepper, name: str, columns: Sequence[str]) -> list[Sensitivity]:
-    """Derivatives with a parameter of the geometry: central differences of two runs, at the levels
-    that both reach.
+    """Derivatives with a parameter of the geometry: central differences of two runs; none where
+    these are not at the same time, as below the critical level of each.
 
     Raises InputError, RunError.
     """
@@ -311,22 +310,19 @@ def of_two_runs(stepper: LoadStepper, name: str, columns: Sequence[str]) -> list
         run.run()
         at_rest = run.history.at_rest
         sides.append([values_of(Side(run.model, s, at_rest)) for s in run.history.saved])
-    return [
-        Sensitivity(
-            name,
-            value,
-            low["time"],
-            low["level"],
-            {
+    rows = []
+    for number, state in enumerate(stepper.history.saved):
+        both, row = [of[number] for of in sides if number < len(of)], dict[str, float]()
+        if len(both) == 2 and all(abs(of["time"] - state.time) < SAME_TIME for of in both):
+            low, high = both
+            row = {
                 column: (high[column] - low[column]) / (2 * OF_GEOMETRY * value)
                 for column in columns
                 if column in low and np.isfinite([low[column], high[column]]).all()
-            },
-            kink=False,
-            of_runs=True,
-        )
-        for low, high in zip(*sides, strict=False)
-    ]
+            }
+        at = float(state.time), float(state.loading.level)
+        rows.append(Sensitivity(name, value, *at, row, kink=False, of_runs=True))
+    return rows
 
 
 def of_point(point: Point, names: Sequence[str]) -> list[Sensitivity]:
@@ -359,11 +355,10 @@ def of_point(point: Point, names: Sequence[str]) -> list[Sensitivity]:
             row = of_level(rate)
             above = larger.get(name, row)
             kink = differ(row, above, {"critical_level": 0.0})
-            if row or above:
-                at = float(point.state.time), float(point.level)
-                rows.append(Sensitivity(name, value, *at, (kink and above) or row, kink))
-    if not rows:
-        raise RunError(f"sensitivity: no derivative with {', '.join(names)} is found, at a kink")
+            at = float(point.state.time), float(point.level)
+            rows.append(Sensitivity(name, value, *at, (kink and above) or row, kink))
+    if not any(row.derivatives for row in rows):
+        raise RunError(not_found(names))
     return rows
 
 
@@ -406,17 +401,45 @@ def write(
     write_csv(folder / FILE, {n: np.array(v) for n, v in table(rows).items()})
     sizes = {n: abs(v) for n, v in results.last.items()}
     listed = changes(rows, printed, sizes, deviations)
-    found = {row["parameter"] for row in listed}
-    without = [name for name in deviations or names if name not in found]
-    statement = "" if listed else no_effect(without)
-    results.info["sensitivity"] = {"statement": statement, "changes": listed, "without": without}
+    without, lost = without_change(rows, listed, deviations or names)
+    results.info["sensitivity"] = {
+        "statement": "" if listed else "\n".join(without_lines(without, lost)),
+        "changes": listed,
+        "without": without,
+        "not_found": lost,
+    }
     if picture and listed:
         draw_changes(listed, results.case, rows[-1].level, folder)
 
 
-def no_effect(names: Iterable[str]) -> str:
-    """What is printed of parameters if none of them has an effect."""
-    return f"sensitivity: no effect of {', '.join(names)}"
+def at_last_step(rows: Sequence[Sensitivity]) -> list[Sensitivity]:
+    """Those at the last level; it may stand before the last step, too, as before an earthquake."""
+    return [*{row.name: row for row in rows if row.level == rows[-1].level}.values()]
+
+
+def without_change(
+    rows: Sequence[Sensitivity], listed: Sequence[Mapping[str, Value]], names: Iterable[str]
+) -> tuple[list[str], list[str]]:
+    """The parameters without an effect, and those whose derivatives are not found, of the names of
+    those that might be among the changes listed.
+    """
+    lost = {row.name for row in at_last_step(rows) if not row.derivatives}
+    rest = [n for n in names if n not in {row["parameter"] for row in listed}]
+    return [n for n in rest if n not in lost], [n for n in rest if n in lost]
+
+
+def without_lines(without: Sequence[str], lost: Sequence[str]) -> list[str]:
+    """What is printed of them."""
+    lines = [f"sensitivity: no effect of {', '.join(without)}"] if without else []
+    return [*lines, not_found(lost)] if lost else lines
+
+
+def not_found(names: Iterable[str]) -> str:
+    """What is printed of parameters whose derivatives are not found."""
+    return (
+        f"sensitivity: no derivative with {', '.join(names)} is found: the state is near a kink or "
+        "at the end of the path, or the joint so stiff that the derivative is round-off"
+    )
 
 
 def words(derived: Mapping[str, Any], width: int | None = None) -> str:
@@ -425,8 +448,8 @@ def words(derived: Mapping[str, Any], width: int | None = None) -> str:
     """
     if derived["statement"]:
         return str(derived["statement"])
-    without = derived.get("without", [])
-    return text(derived["changes"], width) + (f"\n{no_effect(without)}" if without else "")
+    lines = without_lines(derived.get("without", []), derived.get("not_found", []))
+    return "\n".join([text(derived["changes"], width), *lines])
 
 
 def draw_changes(
@@ -452,8 +475,7 @@ def changes(
     deviations, by parameter; those listed are then these, with the change by one of them.
     """
     rows = [row for row in rows if not deviations or row.name in deviations]
-    # of the last step alone: the last level may stand before it, too, as before an earthquake
-    last = [*{row.name: row for row in rows if row.level == rows[-1].level}.values()]
+    last = [row for row in at_last_step(rows) if row.derivatives] if rows else []
     if not last:
         return []
     by_name = deviations or {row.name: 0.01 * row.value or 1.0 for row in last}
