@@ -146,6 +146,15 @@ def run_in_gmsh(project, name, settings):
     return rows.reshape(len(steps), -1, len(PRINTED_OF_JOINTS))[-1]
 
 
+def points_of_views(file):
+    """Coordinates X of the points of each view of a file; views of one name are steps."""
+    found = {}
+    for text in file.read_text().split("View ")[1:]:
+        points = ",".join(re.findall(r"\((.*?)\)", text.split("{", 1)[1])).split(",")
+        found.setdefault(text[1:].split(text[0])[0], []).append(np.array(points[::3], dtype=float))
+    return found
+
+
 def assert_as_in_python(rows, case, folder, tolerance=1e-5):
     """Compare the joints' last rows with those of a run from Python, of the same model."""
     # under a point's force N is a small rest of tension and compression, other in each engine
@@ -174,9 +183,14 @@ def test_lifts_without_python(project):
     case = load(str(project / "own.case"))
     base, lift, _ = assert_as_in_python(rows, case, project / "other")
     assert base.last["slip_length"] > 0 and lift.last["max_opening"] > 0
-    # each joint has its own curves
-    (lengths,) = {len(list((project / "res/own").glob(f"opening_{j}_*.pos"))) for j in range(3)}
-    assert lengths == 2
+    curves = points_of_views(project / "res/own/curves.pos")
+    # each joint has its own, one for each level, from its heel to its toe
+    for title, joint in zip(("base", "lift 12.5 m", "lift 25 m"), case.joints, strict=True):
+        steps = curves[f"opening, {title} [m]"]
+        assert len(steps) == 2
+        for points in steps:
+            assert (np.diff(points) >= 0).all()
+            assert points[[0, -1]] == pytest.approx([0, joint.joint_length], abs=1e-9)
 
 
 SHARED = ("_regions", "_joints")  # ends of files that cases share
@@ -199,8 +213,14 @@ def test_every_case_runs_in_gmsh(project, name):
     rows = run_in_gmsh(project, name, values | words)
     # with points at the joint's nodes Gmsh meshes dam and rock otherwise
     joints = assert_as_in_python(rows, case, project / "other", 1e-3 if case.stores_water else 1e-5)
-    for number in range(len(joints)):  # curves of each
-        assert list((project / "res" / name).glob(f"opening_{number}_*.pos"))
+    results = project / "res" / name
+    if case["dim"] == 2:
+        curves = points_of_views(results / "curves.pos")
+        assert sum(title.startswith("opening") for title in curves) == len(joints)
+        for points in (steps[0] for steps in curves.values()):
+            assert abs(points[0]) < 1e-9 and (np.diff(points) >= 0).all()  # else by number
+    else:
+        assert all(list(results.glob(f"opening_{j}_*.pos")) for j in range(len(joints)))
 
 
 def test_every_case_has_its_files_for_gmsh():
@@ -264,7 +284,14 @@ def test_values_of_joints_are_those_of_python():
 
 @pytest.mark.parametrize(
     "name, given, steps",
-    [("dam", "default_dt = 0.02;\n", 3), ("dam", "", 12), ("stepped", "default_dt = 0.02;\n", 3)],
+    further(
+        2,
+        [
+            ("dam", "default_dt = 0.02;\n", 3),
+            ("dam", "", 12),
+            ("stepped", "default_dt = 0.02;\n", 3),
+        ],
+    ),
 )
 def test_an_earthquake_has_the_time_step_of_its_problem(project, name, given, steps):
     """As Gmsh's tree, made by the .geo file, has none (-1): that of the .pro file with the record,
@@ -279,6 +306,9 @@ def test_an_earthquake_has_the_time_step_of_its_problem(project, name, given, st
     rows = (project / f"res/{name}/quake.txt").read_text().splitlines()
     assert [float(row.split()[7]) for row in rows[1:]] == pytest.approx([0.06 / steps] * steps)
     assert (project / f"res/{name}/after.txt").read_text().strip() == "1"
+    for curve in range(2):  # of the crest, of the slip: over the time
+        ((points,),) = points_of_views(project / f"res/{name}/motion_{curve}.pos").values()
+        assert points == pytest.approx([float(row.split()[1]) for row in rows])
 
 
 def test_an_earthquake_of_a_solid_geometry_of_its_own_is_refused(project):
@@ -445,7 +475,7 @@ def test_window_shows_a_complete_run(window, project):
         assert pixels(picture, BLUE) > 5000
         assert (results / "status.geo").read_text().count("'complete'") == 2
         assert (results / "head.geo").read_text().count("Merge") == 1
-    assert len(list(results.glob("opening_*.pos"))) == 8
+    assert len(points_of_views(results / "curves.pos")["opening [m]"]) == 8
     (reservoir,) = results.glob("water_*.pos")
     assert water_heights(reservoir) == pytest.approx([3, 6, 8, 8.2, 8.4, 8.6, 8.8, 9])
 

@@ -111,6 +111,7 @@ def test_a_geometry_of_its_own_agrees_with_the_condensed_engine(tmp_path, added_
     assert np.abs(expected["slip_mean"]).max() > 1e-4
 
 
+@pytest.mark.heavy
 def test_an_earthquake_of_a_broken_joint_is_refused(tmp_path):
     """Heel and toe move across and along the chord in GetDP, in the joint's frame elsewhere."""
     with pytest.raises(InputError, match="must be straight"):
