@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from damjoint import InputError
 from damjoint.studies import sampling
-from damjoint.studies.plan import Sample, plan_of, sample_of
+from damjoint.studies.outcome import STATIC, report
+from damjoint.studies.plan import Plan, Sample, plan_of, sample_of
 from scipy import stats
 
 MU = ["mu=0.6:1.0:0.2"]
@@ -160,3 +161,20 @@ def test_the_design_of_sobol_indices_has_blocks_of_a_power_of_two():
     for number, given in ((3, ()), (4, ["mu,adhesion=0.5"])):
         with pytest.raises(InputError):
             Sample(number, sample.distributions, "sobol", correlate=given)
+
+
+@pytest.mark.parametrize("number, few", [(32, True), (256, False)])
+def test_too_few_rows_for_sobol_indices_are_said(tmp_path, number, few):
+    """The third input changes nothing: its indices are 0, without an interval."""
+    names = "mu", "adhesion", "rho_dam"
+    sample = Sample(number, dict.fromkeys(names, "uniform(0.5,1)"), "sobol")
+    x = np.column_stack([*sample.values().values()])
+    plan = Plan({}, sample.values(), {}, sobol=number)
+    outcome = np.maximum(x[:, 0] - 1.45, 0) if few else x[:, 0] + x[:, 1]
+    known = {"verdict": "stands", "failed": "0", **dict.fromkeys(STATIC, "")}
+    rows = [
+        {**known, "crest_ux": str(y), **dict(zip(names, cells, strict=True))}
+        for y, cells in zip(outcome.tolist(), x.astype(str).tolist(), strict=True)
+    ]
+    text = report(plan, rows, tmp_path / "s.csv")
+    assert (f"{number} rows in a block are too few for the indices of crest_ux" in text) == few

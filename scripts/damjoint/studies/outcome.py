@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,9 @@ from .sweep import UNDECIDED
 FAILED = "failed"
 STATIC = ("crack_length", "max_opening", "crest_ux")
 OF_QUAKES = ("residual_slip", "residual_tilt")
+
+#: Half of the interval of one of Sobol's indices beyond which the rows are too few for it [-].
+VAGUE = 0.5
 
 
 def groups(plan: Plan, rows: list[Row], independent: bool = False) -> list[tuple[Row, list[Row]]]:
@@ -85,6 +89,14 @@ def indices(plan: Plan, rows: list[Row]) -> list[dict[str, Value]]:
     return table
 
 
+def is_vague(row: Mapping[str, Value]) -> bool:
+    """Whether the interval of one of Sobol's indices in a row is wide, or not known: of an input
+    that changes nothing the index is 0 without an interval.
+    """
+    names = [name for name in ("first", "total") if row.get(name)]
+    return not all(float(row[f"{name}_interval"]) <= VAGUE for name in names)
+
+
 def report(plan: Plan, rows: list[Row], out: Path) -> str:
     """Both tables as text; writes OUT_probability.csv and OUT_sensitivity.csv beside the rows."""
     texts = []
@@ -99,4 +111,9 @@ def report(plan: Plan, rows: list[Row], out: Path) -> str:
         write_rows(beside(out, ending), table)
         cells = [{n: None if v != v else v for n, v in row.items()} for row in table]  # nan
         texts.append(f"{title}\n{tabulate(cells, 'keys', floatfmt='.4g', missingval='-')}")
+        if vague := [str(row["outcome"]) for row in table if is_vague(row)]:
+            texts[-1] += (
+                f"\n{plan.sobol} rows in a block are too few for the indices of "
+                f"{', '.join(dict.fromkeys(vague))}: a larger --sample determines them"
+            )
     return "\n\n".join(texts)
