@@ -24,6 +24,7 @@ from damjoint.model.results import (
     QUAKE,
     THICKNESS,
 )
+from damjoint.studies import sensitivity
 from damjoint.studies.critical import Search
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
@@ -248,6 +249,27 @@ def test_a_scene_in_other_consistent_units_has_the_same_results(tmp_path, scene,
     for a, b in ((one.joint, two.joint), (one.history, two.history)):
         wanted = {n: scaled.get(n, lambda v: v)(v) for n, v in a.items() if n not in COUNTS}
         assert not {n: off for n, off in differences(wanted, b).items() if off > 1e-10}
+
+
+@pytest.mark.heavy
+def test_derivatives_with_parameters_that_are_zero_do_not_depend_on_units():
+    """Their differences have no value to be a part of; with powers of two to the last digit."""
+    settings = {"uplift": "imposed", "n_joint": 4.0, "order": 1.0, "h_dam": 15.0, "h_found": 60.0}
+    case = load("dam", BOND | settings, "30", "3")
+    other, scaled = in_units(case, BINARY)
+    names = ["silt_height", "ice_force", "k_h", "joint_head_offset"]
+    rows = [sensitivity.of_run(c, names) for c in (case, other)]
+    for one, two in zip(*rows, strict=True):
+        unit = DIMENSIONS[declared()[one.name].unit]
+        factor = float(np.prod(np.power(BINARY, unit)))
+        for column in ("crest_ux", "max_opening", "N", "T", "M", "U"):
+            wanted = scaled[column](one.derivatives[column]) / factor
+            assert two.derivatives[column] == wanted, (one.name, column)
+    by = {row.name: row.derivatives for row in rows[0]}
+    assert by["ice_force"]["T"] == pytest.approx(1, rel=1e-9)
+    # p = K0 rho g h^2/2 has no slope at 0: of the weight of silt 1 m high
+    assert abs(by["silt_height"]["T"]) < 1e-5 * 0.5 * 900 * 9.81 / 2
+    assert by["joint_head_offset"]["U"] > 0
 
 
 @pytest.mark.heavy

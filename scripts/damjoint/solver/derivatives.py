@@ -50,10 +50,12 @@ from .load_stepper import SAME_TIME
 from .model import Begun, Model, StepResult
 from .state import State, Trace
 
-#: Half of the difference of a parameter, over its value [-]; of one that is zero in its unit, and
-#: in these units.
+#: Half of the difference of a parameter, over its value [-].
 DIFFERENCE = 3e-6
-ZERO = {"Pa": 1.0, "Pa per m": 1e5, "N per m": 1e-1, "kg per m3": 1e-2}
+#: That of one that is zero: of a length over the size of the dam [-], small, as the load of silt
+#: grows with the square of its height; of a stress over E_dam [-]; of a number, angle or
+#: temperature [in its unit].
+ZERO_LENGTH, ZERO_STRESS, ZERO_NUMBER = 1e-7, 5e-11, 1e-5
 
 #: Corrections of a derivative at most.
 CORRECTIONS = 6
@@ -139,6 +141,22 @@ def crack_ends(joint: JointInterface, beyond: Array) -> Array:
     return np.where(closed.any(axis=1), np.where(first > 0, ends, 0.0), joint.length)
 
 
+def half_of_zero(case: Case, unit: str) -> float:
+    """Half of the difference of a parameter that is zero, by its unit: the same in all consistent
+    units of length, mass and time.
+    """
+    size, stress, g = case.size, ZERO_STRESS * case["E_dam"], case["g"]
+    return {
+        "m": ZERO_LENGTH * size,
+        "Pa": stress,
+        "Pa per m": stress / size,
+        "N per m": stress * size,
+        "N m per m": stress * size**2,
+        "kg per m3": stress / (g * size),
+        "m per Pa": ZERO_LENGTH * size / case["E_dam"],
+    }.get(unit, ZERO_NUMBER)
+
+
 def half_difference(case: Case, name: str) -> tuple[float, float, float]:
     """The value of a parameter, and those on both sides of it: the value itself where the
     parameter allows none beyond it.
@@ -161,7 +179,7 @@ def half_difference(case: Case, name: str) -> tuple[float, float, float]:
             f"{names[0]}.{of_joint}"
         )
     value = float(case.joints[names.index(joint) if joint else 0][of_joint])
-    half = DIFFERENCE * abs(value) or ZERO.get(known.unit, 1e-5)
+    half = DIFFERENCE * abs(value) or half_of_zero(case, known.unit)
     low, high = value - half, value + half
     low, high = (end if known.allows(end) else value for end in (low, high))
     if not value and of_joint in MARKS:  # the first force adds a point to the mesh: on both sides
