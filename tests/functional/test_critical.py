@@ -727,7 +727,7 @@ def test_a_highest_level_that_depends_on_the_increments_is_not_confirmed(monkeyp
     assert "not confirmed: between 48 and 49 m, depending on" in lines
 
 
-def half(self, verified):
+def half(self):
     """In place of a path by shorter increments: the first half of this one."""
     other = self.copied()
     del other.points[len(other.points) // 2 :]
@@ -738,8 +738,18 @@ def half(self, verified):
 @pytest.mark.parametrize("law", ["friction", "bond"])
 def test_sliding_is_repeated_by_shorter_increments_where_the_law_has_a_history(monkeypatch, law):
     settings = DAM | {"law": law, "mu": 0.6, "adhesion": 0.0, "sigma_max": 0.0}
+    along, compared = FailurePath.along, set()
+
+    def along_and_recorded(self, *increment):
+        if self.longest < np.inf:  # a repetition
+            compared.add(self.verified)
+        return along(self, *increment)
+
+    monkeypatch.setattr(FailurePath, "along", along_and_recorded)
     search, answer = search_result("dam", settings=settings)
     assert search.trials[-1].path.slides and answer.mode == "sliding" and answer.confirmed
+    # single increments whose halves lead elsewhere are of no branch and confirm nothing
+    assert compared == ({True} if law == "bond" else set())
     monkeypatch.setattr(FailurePath, "by_shorter", half)
     _, answer = search_result("dam", settings=settings)
     assert answer.confirmed == (law == "friction")
@@ -749,9 +759,9 @@ def test_the_interval_has_the_highest_level_of_every_path(monkeypatch):
     """Each path by shorter increments ends lower than the one before."""
     tops = []
 
-    def lower(self, verified):
+    def lower(self):
         tops.append(max(self.levels))
-        return half(self, verified)
+        return half(self)
 
     monkeypatch.setattr(FailurePath, "by_shorter", lower)
     monkeypatch.setattr(Search, "after_growth", lambda self, path: ({}, path))

@@ -805,16 +805,14 @@ class EquilibriumPath:
 
     def repeated(self: P) -> P | None:
         """The path by shorter increments from before its highest level, to be continued; None if
-        they lead to the same level, to the precision, by single increments or else by those whose
-        halves lead to the same state.
+        they lead to the same level, to the precision.
         """
         top = self.points[self.top] if self.points else None
         if top is None or (top.slides and not top.model.equilibrium.path_dependent):
             return None
-        for verified in (False, True):
-            again = self.by_shorter(verified)
-            if not self.widen(again, PRECISION / 2):
-                return None
+        again = self.by_shorter()
+        if not self.widen(again, PRECISION / 2):
+            return None
         again.longest = np.inf
         again.interval = self.interval
         return again
@@ -830,8 +828,10 @@ class EquilibriumPath:
         self.interval = float(np.nanmin(known)), float(np.nanmax(known))
         return True
 
-    def by_shorter(self: P, verified: bool) -> P:
-        """The path with shorter increments from before its highest level to beyond it."""
+    def by_shorter(self: P) -> P:
+        """The path with shorter increments, compared with their halves, from before its highest
+        level to beyond it.
+        """
         again = self.copied()
         before = self.levels[: self.top] < (1 - REPEATED) * self.highest
         begin = max([0, *np.flatnonzero(before), *(n for n in self.starts if n <= self.top)])
@@ -840,7 +840,7 @@ class EquilibriumPath:
         again.starts = [number for number in self.starts if number <= begin]
         again.closed, again.ended = list[Point](), False
         again.growth, again.longest = 1.0, max(lengths, default=0.0) / SHORTER
-        again.verified, distance = verified, 0.0
+        again.verified, distance = True, 0.0
         while not again.ended and distance < sum(lengths) + 2 * again.longest:
             number = len(again.points)
             if not again.advance_branch() or len(again.points) == number:
