@@ -57,6 +57,11 @@ class RandomQuake(RandomScene):
         return ["quake", *super().words[1:], "--record", str(self.file)]
 
     @property
+    def before(self) -> RandomScene:
+        """The scene of its static loads."""
+        return RandomScene(self.settings, self.levels, self.tail_levels, self.steps)
+
+    @property
     def case(self) -> Case:
         """The case as the command loads it; writes the record."""
         self.file.parent.mkdir(exist_ok=True)
@@ -69,9 +74,9 @@ class RandomQuake(RandomScene):
 
 
 def random_quake(seed: int, number: int, folder: Path) -> RandomQuake:
-    """Draw earthquake `number` of a seed, with its record in a folder: a dam that stands before it,
-    of any law, uplift and damping, with one to three joints; in one of eight scenes each on an
-    elastic joint, or a rigid block. New draws are appended, so that old seeds stay reproducible.
+    """Draw earthquake `number` of a seed, with its record in a folder: a dam of
+    any law, uplift and damping, with one to three joints; in one of eight scenes each on an elastic
+    joint, or a rigid block. New draws are appended, so that old seeds stay reproducible.
     """
     rng = RandomNumbers(seed, number, QUAKE_DRAWS)
     height, solid = rng.log_uniform(8, 120), rng.event(0.1)

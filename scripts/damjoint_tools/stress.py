@@ -57,6 +57,8 @@ IN_TIME = {"flow in time": "time_unit="}
 #: Every how many scenes the load steps and the critical level are computed again.
 AGAIN = 5
 
+#: What `damjoint quake` says of a dam that does not stand before the earthquake.
+NO_START = "the static loads have no equilibrium"
 #: Limit of a command's CPU time [s], and of its duration while others run, over that.
 TIME_LIMIT, LONGEST = 300, 4
 
@@ -86,7 +88,24 @@ def run_and_verify(scene: RandomScene, folder: Path, twice: bool = False) -> dic
             row |= computed_again(scene, run, folder, row)
     except RunError as error:
         row |= {"class": DEFECT, "findings": str(error)}
+        if isinstance(scene, RandomQuake) and NO_START in str(error):
+            row |= without_start(scene, folder)
         row.setdefault("seconds", f"{time.perf_counter() - start:.2f}")
+    return row
+
+
+def without_start(scene: RandomQuake, folder: Path) -> dict[str, object]:
+    """Return class, findings and size of an earthquake whose static loads are said to have no
+    equilibrium, by a run with these loads.
+    """
+    try:
+        run = run_of(scene.before, folder, name="before", fields=True)
+    except RunError as error:
+        return {"kind": scene.kind, "class": DEFECT, "findings": str(error)}
+    row = {"kind": scene.kind, "verdict": run.files.record["verdict"]} | verified(run)
+    if not run.files.stopped:
+        findings = f"{NO_START}, but a run with them has one"
+        row |= {"class": DEFECT, "findings": findings}
     return row
 
 

@@ -102,14 +102,17 @@ time limit is a defect.
 
 Not checked here: stresses in the bodies and pictures; the default values themselves; that the
 branch which the load steps follow is the one that a dam would take, where there are several
-equilibria; geometries of one's own, but for two blocks whose joints meet, and so tractions on a
+equilibria; whether a critical level is too low, but by limit analysis (a run to a higher level may
+end in an equilibrium of another path: a joint that softens can have several);
+geometries of one's own, but for two blocks whose joints meet, and so tractions on a
 region of theirs; the factors of safety of `damjoint check`; derivatives, reliability and
 calibration (the tests compare them with differences and closed forms); the reference GetDP model
 (the tests compare it with the engine of these runs)."""
 
 #: What `damjoint stress --quake` verifies in every scene, and beside it.
 QUAKES_VERIFIED = """\
-- *Start*: the first frame of `quake_joint.csv` is the static state; the motion begins at rest.
+- *Start*: the first frame of `quake_joint.csv` is the static state; the motion begins at rest. Of a
+  dam that is said not to stand before the earthquake: the stop of `damjoint run`, as of dams.
 - *Motion*: the displacement of the crest is the integral of its acceleration, by Newmark's
   differences; the acceleration of the ground is that of the record, in rock with mass later by the
   travel time of the wave.

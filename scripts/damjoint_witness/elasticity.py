@@ -70,8 +70,9 @@ from .water_in_time import heads_in_time
 #: Rounding of a jump over the largest jump or displacement at the joints. What is more must be the
 #: residual of the step: the forces in the joints that move the bodies by the difference, over those
 #: that close the joints, are the residual, but that history.csv has it over the loads of the
-#: highest level (0.25 to 2.4 of it in a hundred steps). By the jumps alone there is no bound: where
-#: stiff rock holds a joint, its displacements are small beside what a force does to the concrete.
+#: highest level (0.25 to 2.4 of it in 12 steps of random dams 112-20 to 112-30). By the jumps
+#: alone there is no bound: where stiff rock holds a joint, its displacements are small beside what
+#: a force does to the concrete.
 ROUNDING, SAME_RESIDUAL = 1e-10, 10.0
 #: Sum of forces and moments on a body: the residual times OF_RESIDUAL, over the sizes of the forces
 #: on the body that has the most, as it is one of the whole dam, and ROUNDING, over those on itself.

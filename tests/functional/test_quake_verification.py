@@ -346,3 +346,18 @@ def test_engines_that_differ_are_compared_again_with_shorter_steps(files, tmp_pa
         scene, files.shaken, lambda _, *options: other if options else files.shaken
     )
     assert len(violated) == 1 and violated[0].startswith("engines: ")
+
+
+@pytest.mark.heavy
+def test_a_dam_that_does_not_stand_before_the_earthquake_is_judged_as_in_a_run(tmp_path):
+    """It slides (T > mu N); with less water the command's refusal would be a defect."""
+    settings = DAM | {"mu": 0.6, "adhesion": 0.0}
+    record = np.array([[0, 0, 0], [0.1, 1, 0]], float)
+    falls = RandomQuake(settings, "45", "0", 1, record, tmp_path / "r.csv")
+    _ = falls.case
+    row = stress.run_and_verify(falls, tmp_path)
+    assert (row["class"], row["kind"]) == (stress.JUSTIFIED, random_quakes.DAM), row
+    stands = replace(falls, levels="20")
+    row = stress.without_start(stands, tmp_path)
+    assert row["class"] == stress.DEFECT
+    assert row["findings"] == f"{stress.NO_START}, but a run with them has one"
