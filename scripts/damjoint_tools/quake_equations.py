@@ -38,7 +38,7 @@ def joint_forces(quake: Earthquake, begin: Moving, end: Moving) -> Array:
     return interface.forces(traction)
 
 
-def damping_text(quake: Earthquake, begin: Moving) -> Sparse:
+def damping_matrix(quake: Earthquake, begin: Moving) -> Sparse:
     """Return the damping matrix (n, n) of a step."""
     problem = quake.problem
     return (with_corner_dashpots(problem, begin.state) if quake.published else problem).damping
@@ -66,7 +66,7 @@ def follow(quake: Earthquake) -> dict[str, float]:
     viscous, worst, given, rise = np.zeros(system.size), 0.0, 0.0, 0.0
     energies = [np.zeros(4)]
     for step in quake.steps():
-        end, damping = step.end, damping_text(quake, begin)
+        end, damping = step.end, damping_matrix(quake, begin)
         motion, moved = end.motion, end.motion.displacement - begin.motion.displacement
         joint_before, forces_before, load_before = joint, forces, load
         water = pressures_in_motion(quake.case, problem, begin.state)

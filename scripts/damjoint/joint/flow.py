@@ -316,7 +316,7 @@ class Flow:
         if fields.dim == 3:
             # the flow matrix is linear in the conductivities: products of slopes of each point, and
             # their entries in the matrix
-            self.products, case_entries = [], []
+            self.products, positions = [], []
             pattern = fields.at_points
             for width in np.unique(pattern.counts):
                 rows = np.flatnonzero(pattern.counts == width)
@@ -326,8 +326,8 @@ class Flow:
                     g.data[entries][:, :, None] * g.data[entries][:, None, :] for g in fields.slopes
                 )
                 self.products.append((rows, product))
-                case_entries.append((number * nodes[:, :, None] + nodes[:, None, :]).ravel())
-            self.entries = np.concatenate(case_entries)
+                positions.append((number * nodes[:, :, None] + nodes[:, None, :]).ravel())
+            self.entries = np.concatenate(positions)
 
     def _towards_toe(self) -> list[Array]:
         slopes = [g @ self.fields.xi for g in self.fields.slopes]

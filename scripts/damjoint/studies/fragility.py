@@ -239,6 +239,6 @@ def report(curves: Sequence[Fit], out: Path, intensity: str) -> str:
         else f"{sampling.CONFIDENCE:.0%} interval of independent rows: rows of one record are not"
     )
     heads = [name.replace(" [", "\n[") for name in cells[0]]
-    formatted_table = aligned([tuple(map(str, c.values())) for c in cells], heads, left=1, right=1)
+    lines = aligned([tuple(map(str, c.values())) for c in cells], heads, left=1, right=1)
     reasons = [f"{curve.words}: {curve.reason}" for curve in curves if curve.reason]
-    return "\n".join([f"Fragility, lognormal in {intensity} ({how})", formatted_table, *reasons])
+    return "\n".join([f"Fragility, lognormal in {intensity} ({how})", lines, *reasons])
