@@ -379,8 +379,9 @@ def window(project, tmp_path):
         if not shutil.which(tool):
             pytest.skip(f"{tool} is missing (apt-get install xvfb xdotool imagemagick)")
     read, write = os.pipe()
+    server = ["Xvfb", "-displayfd", str(write), "-screen", "0", "1300x900x24", "-nolisten", "tcp"]
     screen = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1300x900x24", "-nolisten", "tcp"],
+        [*server, "-noreset"],  # when its last client leaves, which may be a search of a window
         pass_fds=(write,),
         stderr=subprocess.DEVNULL,
     )

@@ -943,7 +943,7 @@ def test_run_in_the_window_on_a_virtual_screen(tmp_path, screen):
         pytest.skip(f"needs {', '.join(missing)} (apt: xvfb xdotool imagemagick)")
     script = tmp_path / "press.sh"
     script.write_text(PRESS.format(python=sys.executable))
-    server = f"-screen 0 {screen[0]}x{screen[1]}x24"
+    server = f"-noreset -screen 0 {screen[0]}x{screen[1]}x24"
     words = ["xvfb-run", "-a", "-s", server, "sh", str(script)]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
     output = done.stdout + done.stderr
