@@ -213,3 +213,13 @@ def test_a_path_lost_from_an_earlier_state_is_followed_from_the_last_one(solve):
     assert verdict(result) == "sliding"
     (highest,) = re.findall(r"reaches (\S+) m at most", statement(result))
     assert result.last["level"] == pytest.approx(float(highest), rel=1e-4)
+
+
+def test_a_path_ends_where_all_strength_is_lost():
+    """Nothing holds a dam whose mixed joint has broken whole: the level falls to the base."""
+    case = load("dam", {"law": "mixed", "n_joint": 10})
+    path = FailurePath(case, interface_of(case), target=60)
+    path.follow(np.inf)
+    levels = np.array([point.level for point in path.points])
+    assert path.ended
+    assert levels[-1] < 0.01 * levels.max() <= levels[:-1].min()

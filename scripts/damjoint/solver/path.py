@@ -148,6 +148,9 @@ REPEATED = 0.01
 #: By how many times shorter increments it is repeated.
 SHORTER = 4
 
+#: A path whose level falls below this part of its highest one is not followed farther: the joints
+#: hold no water any more.
+STRENGTH_LOST = 0.01
 #: Most equilibria on a path.
 MOST_POINTS = 800
 
@@ -484,8 +487,9 @@ class EquilibriumPath:
 
     @property
     def exhausted(self) -> bool:
-        """Whether it has as many points as a path may have."""
-        return len(self.points) >= MOST_POINTS
+        """Whether it has as many points as a path may have, or the strength is lost."""
+        lost = self.points[-1].level < STRENGTH_LOST * self.highest
+        return lost or len(self.points) >= MOST_POINTS
 
     def add(self, point: Point) -> None:
         """Append an equilibrium."""
