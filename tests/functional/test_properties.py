@@ -34,7 +34,9 @@ from variants import further
 #: Without the search for a simpler failing example, which would take minutes.
 few = settings(max_examples=8, deadline=None, derandomize=True, phases=[Phase.generate])
 
-#: A coarse mesh of the default dam, with batter and neck.
+#: A coarse mesh of the default dam.
+COARSE = {"n_joint": 4.0, "order": 1.0, "h_dam": 15.0, "h_found": 60.0}
+#: One with batter and neck.
 SECTION = {"n_joint": 10.0, "h_dam": 15.0, "h_found": 60.0, "batter": 3.0, "neck_height": 5.0}
 #: Joints that crack, soften and slip below the requested levels, and still stand.
 LAWS = {
@@ -307,6 +309,43 @@ def test_studies_in_other_consistent_units_have_the_same_results(tmp_path, units
     names = [name for name in one.dtype.names if name not in COUNTS]
     wanted, two = {n: scaled[n](one[n]) for n in names}, {n: two[n] for n in names}
     assert not {n: off for n, off in differences(wanted, two).items() if off > within}
+
+
+@pytest.mark.heavy
+def test_reliability_and_calibration_in_mm_are_those_in_m(tmp_path):
+    """To ten digits the distance of the design point, by as many critical levels: the size of the
+    limit state does not decide where a search ends. Its values, of twelve digits as in the file,
+    are differentiated twice for the probabilities.
+    """
+    units = length, stress, acceleration = SYSTEMS["mm, t, s"]
+    density, modulus = stress / (length * acceleration), 2e10 * stress
+    slides = {"law": "friction", "adhesion": 0.0, "pena_tang": 0.0, "uplift": "none"}
+    case = load("dam", COARSE | slides | {"E_found": 2e10}, "30,36")
+    other, _ = in_units(case, units)
+
+    def reliability(case, length, density):
+        about = lambda mean, deviation, unit: f"normal({mean * unit!r},{deviation * unit!r})"
+        varied = {"rho_dam": about(2400, 50, density), "level": about(38.5, 0.8, length)}
+        return dj.reliability(case, mu="lognorm(0.12,scale=0.6)", **varied, samples=0, jobs=1)
+
+    one, two = reliability(case, 1.0, 1.0), reliability(other, length, density)
+    assert one.levels.computed == two.levels.computed <= 15
+    assert two.beta == pytest.approx(one.beta, rel=1e-10)
+    assert two.design["level"] == pytest.approx(length * one.design["level"], rel=1e-10)
+    for name in ("form", "breitung", "tvedt"):
+        assert getattr(two.rows[0], name) == pytest.approx(getattr(one.rows[0], name), rel=1e-8)
+
+    def calibrate(case, length, modulus):
+        lines = [(28, 0.0), (32, -2.1e-4), (36, -5.2e-4), (34, -3.4e-4)]
+        rows = [f"{h * length!r},{u * length!r},{1e-5 * length!r}" for h, u in lines]
+        path = tmp_path / "m.csv"
+        path.write_text("\n".join(["level,crest_ux,crest_ux_sd", *rows]))
+        return dj.calibrate(case, path, [f"E_found={modulus / 10!r}:{modulus * 10!r}"], jobs=1)
+
+    one, two = calibrate(case, 1.0, 2e10), calibrate(other, length, modulus)
+    np.testing.assert_allclose(two.estimates, stress * one.estimates, rtol=1e-8)
+    np.testing.assert_allclose(two.intervals, stress * one.intervals, rtol=1e-8)
+    np.testing.assert_allclose(two.squares, one.squares, rtol=1e-8)
 
 
 # -- meshes

@@ -59,10 +59,11 @@ def add(command: Parser) -> None:
 
 def call(arguments: argparse.Namespace) -> int:
     """Run damjoint reliability."""
-    from ..studies.reliability import Variables, openturns
+    from ..studies import openturns_process
+    from ..studies.reliability import Variables
     from ..studies.reliability_study import reliability
 
-    openturns()
+    openturns_process.version()
     distributions = pairs("--vary", arguments.vary, "mu=normal(1.0,0.15)")
     tied = pairs("--tie", arguments.tie, "adhesion=2e5*mu")
     variables = Variables(distributions, arguments.correlate, tied)

@@ -11,12 +11,9 @@ a path of another mesh gives, central differences.
 
 from __future__ import annotations
 
-import signal
-import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -34,6 +31,8 @@ from ..threads import limited_threads
 from . import keys, sampling
 from .critical import Search
 from .critical_value import CriticalValue
+from .openturns_process import OpenTurns, openturns, points_around
+from .openturns_process import design_point as nearest_point
 from .plan import Plan, Sample, checked, in_file, planned_cases, rounded, up_to
 from .sweep import ERROR, error_message, search_of, spread_bundles
 
@@ -46,12 +45,14 @@ SAME_LEVEL = 1e-5
 #: Half of the difference of an expression, over the value of a variable [-].
 OF_EXPRESSIONS = 1e-4
 
-#: Tolerance of the design point, in standard deviations and relative [-], and of its limit state
-#: [m]; if that is not reached, the precision of a critical level is the tolerance.
-TOLERANCE = 1e-4
+#: Unit of the limit state in the search for a design point, over its slope where that begins, per
+#: standard deviation [-]. The search adds |g| to half of the square of the distance: in a larger
+#: unit it cuts its steps, in a smaller one a distance that is too large costs it nothing.
+UNIT = 1 / 3
 
-#: Iterations after which the search for a design point ends without one.
-MOST_ITERATIONS = 20
+#: Tolerance of the design point, in standard deviations and relative, and of its limit state, in
+#: its unit [-]; if that is not reached, the precision of a critical level is the tolerance.
+TOLERANCE = 1e-4
 
 #: Samples that are evaluated together.
 BLOCK = 50
@@ -66,23 +67,11 @@ LOWER = 0.25
 #: sample of a thousand takes is refused before the first critical level [-].
 REACH = 3.1
 
-#: Adhesion [Pa] of the joints that cannot fail in the limit state of another one.
-UNBREAKABLE = 1e12
+#: Adhesion of the joints that cannot fail in the limit state of another one, over E of the dam [-].
+UNBREAKABLE = 50.0
 
 #: Columns of a critical level in reliability.csv, after key, of_joint and the variables.
 RESULTS = ("critical_level", "mode", "joint", "confirmed", "confirmed_by")
-
-
-def openturns() -> ModuleType:
-    """The library. Raises InputError if it is not installed."""
-    try:
-        import openturns
-    except ImportError:
-        raise InputError(
-            "reliability: needs openturns; pip install 'damjoint[reliability]'"
-        ) from None
-    openturns.Log.Show(openturns.Log.NONE)  # its warnings would be mixed with ours
-    return openturns
 
 
 @dataclass(frozen=True)
@@ -150,23 +139,10 @@ class Variables:
             for name, kind, number in zip(self.names, self.marginals, z, strict=True)
         }
 
-    def normal(self) -> Any:
-        """The joint distribution of the normal variables, of OpenTURNS.
-
-        Raises InputError if the correlations are not those of any distribution.
-        """
-        ot, number = openturns(), len(self.names)
-        ranks = ot.CorrelationMatrix(number)
-        for text in self.correlate:
-            i, j, rank = sampling.correlation(text, self.names)
-            ranks[i, j] = rank
-        try:
-            matrix = ot.NormalCopula.GetCorrelationFromSpearmanCorrelation(ranks)
-            return ot.Normal([0.0] * number, [1.0] * number, matrix)
-        except (TypeError, RuntimeError):
-            raise InputError(
-                "--correlate: must form a positive definite matrix of correlations"
-            ) from None
+    def rank_correlations(self) -> Array:
+        """Their rank correlations, a matrix. Raises InputError if no Gaussian copula has them."""
+        pairs = [sampling.correlation(text, self.names) for text in self.correlate]
+        return sampling.rank_correlations(pairs, len(self.names))
 
 
 def check_continuous(option: str, name: str) -> None:
@@ -266,12 +242,13 @@ class CriticalLevels:
         if not joint:
             return next(case for _, case in planned_cases(self.case, plan)) if values else self.case
         settings = dict(next(plan.rows())) if values else {}
+        unbreakable = UNBREAKABLE * self.case["E_dam"]
         for other in self.case.joint_names:
             if other != joint:
                 mine = [name for name in settings if name.startswith(f"{other}.")]
                 for name in mine:
                     del settings[name]
-                settings |= {f"{other}.law": "friction", f"{other}.adhesion": UNBREAKABLE}
+                settings |= {f"{other}.law": "friction", f"{other}.adhesion": unbreakable}
         return varied(self.case, settings)
 
     def matters(self, joint: str, name: str) -> bool:
@@ -355,16 +332,8 @@ class LimitState:
 
     def __init__(self, levels: CriticalLevels, joint: str = "") -> None:
         self.levels, self.joint = levels, joint
-        #: what has ended an evaluation, which OpenTURNS would replace
-        self.error: BaseException | None = None
-        #: whether levels are computed with their derivatives
-        self.with_rates = True
-        ot, number = openturns(), len(levels.variables.names)
-        parts = {"gradient": self.gradient, "hessian": self.hessian}
-        function = ot.PythonFunction(number, 1, func_sample=self.evaluated, **parts)
-        self.function = ot.Function(function)
 
-    def gradient(self, point: Any) -> list[list[float]]:
+    def gradient(self, point: Any) -> Array:
         """The derivatives (n, 1) of g with the normal variables at a point: by those of the
         critical level, else differences: central, but at the medians, where the search begins.
         """
@@ -375,21 +344,17 @@ class LimitState:
             others = z - steps if z.any() else z[None]
             values = np.ravel(self.evaluated([*(z + steps), *others], False))
             high, low = values[: len(z)], values[len(z) :]
-            return [[float(slope)] for slope in (high - low) / (STEP * (2 if z.any() else 1))]
+            return ((high - low) / (STEP * (2 if z.any() else 1)))[:, None]
         slopes = variables.slopes(z)
         of_level = {"level": -1.0}
-        return [[slopes[n] * (rates | of_level).get(n, 0.0)] for n in variables.names]
+        return np.array([[slopes[n] * (rates | of_level).get(n, 0.0)] for n in variables.names])
 
     def rates(self, z: Array) -> dict[str, float] | None:
         """The derivatives of the critical level with the variables; None if it has none."""
         self.evaluated([z])
-        try:
-            return self.levels.rates(self.joint, self.levels.variables.values(z))
-        except BaseException as error:
-            self.error = error
-            raise
+        return self.levels.rates(self.joint, self.levels.variables.values(z))
 
-    def hessian(self, point: Any) -> list[list[list[float]]]:
+    def hessian(self, point: Any) -> Array:
         """The second derivatives (n, n, 1) of g: central differences of the first ones; of values,
         two more for each pair of variables, where the critical level has no derivatives.
         """
@@ -405,43 +370,24 @@ class LimitState:
             bends = np.diag(sums)
             bends[i, j] = (both.reshape(2, -1).sum(axis=0) - 2 * here - sums[i] - sums[j]) / 2
             bends[j, i] = bends[i, j]
-            return [[[float(bend)] for bend in row] for row in bends / STEP**2]
+            return bends[:, :, None] / STEP**2
         self.evaluated([*(z + steps), *(z - steps)])  # in parallel
         rows = [np.ravel(self.gradient(z + s)) - np.ravel(self.gradient(z - s)) for s in steps]
         bends = np.array(rows) / (2 * STEP)
-        return [[[float(bend)] for bend in row] for row in (bends + bends.T) / 2]
+        return ((bends + bends.T) / 2)[:, :, None]
 
-    def evaluated(self, points: Any, rates: bool | None = None) -> list[list[float]]:
-        """g at points; where its level is not known, the dam counts as failed. rates: whether
-        levels are computed with their derivatives (None: as said).
+    def evaluated(self, points: Any, rates: bool = True) -> Array:
+        """g (points, 1) at points; where its level is not known, the dam counts as failed. rates:
+        whether levels are computed with their derivatives.
         """
-        if threading.current_thread() is threading.main_thread():
-            # OpenTURNS has set its own while it runs, which ends a pool by a segmentation fault
-            signal.signal(signal.SIGINT, signal.getsignal(signal.SIGINT))
-        try:
-            rows = [self.levels.variables.values(z) for z in np.asarray(points)]
-            rates = self.with_rates if rates is None else rates
-            results = self.levels.of(self.joint, rows, rates)
-        except BaseException as error:
-            self.error = error
-            raise
+        rows = [self.levels.variables.values(z) for z in np.asarray(points)]
+        results = self.levels.of(self.joint, rows, rates)
         top = self.levels.case.levels[-1]
-        return [
-            [float(result["critical_level"] or 0.0) - row.get("level", top)]
+        margins = [
+            float(result["critical_level"] or 0.0) - row.get("level", top)
             for row, result in zip(rows, results, strict=True)
         ]
-
-    def run(self, algorithm: Any) -> Any:
-        """The result of an algorithm. Raises what an evaluation has raised."""
-        try:
-            algorithm.run()
-        except BaseException as error:
-            if self.error:
-                raise self.error from None
-            if "Interruption" in str(error):  # between two evaluations
-                raise KeyboardInterrupt from None
-            raise
-        return algorithm.getResult()
+        return np.array(margins)[:, None]
 
 
 # -- methods
@@ -500,77 +446,47 @@ class Reliability:
         return abs(probability - self.sampled) <= DISAGREES * error
 
 
-def design_point(limit: LimitState, normal: Any, start: Sequence[float]) -> Reliability:
+def design_point(limit: LimitState, library: OpenTurns, start: Sequence[float]) -> Reliability:
     """FORM and SORM of a limit state; start: normal variables where the search begins.
 
     Raises InputError, RunError.
     """
-    ot, variables = openturns(), limit.levels.variables
-    event = ot.ThresholdEvent(
-        ot.CompositeRandomVector(limit.function, ot.RandomVector(normal)), ot.Less(), 0.0
-    )
-    solver = ot.AbdoRackwitz()
-    solver.setStartingPoint(list(start))
-    solver.setMaximumIterationNumber(MOST_ITERATIONS)
-    solver.setMaximumAbsoluteError(TOLERANCE)
-    solver.setMaximumRelativeError(TOLERANCE)
-    solver.setMaximumResidualError(TOLERANCE)
-    precision = PRECISION * limit.levels.case.levels[-1]
-    for tolerance in (TOLERANCE, precision):
-        solver.setMaximumConstraintError(tolerance)
-        try:
-            result = limit.run(ot.FORM(solver, event))
-            break
-        except RuntimeError as error:  # no point of the limit state is found
-            if limit.error or isinstance(error, RunError):
-                raise
-    else:
+    variables, precision = limit.levels.variables, PRECISION * limit.levels.case.levels[-1]
+    unit = UNIT * float(np.linalg.norm(limit.gradient(start))) or 1.0
+    tolerances = TOLERANCE, precision / unit
+    problem = variables.rank_correlations(), start, tolerances, unit
+    found = library.result(nearest_point, *problem, answers=limit)
+    if found is None:
         origin = dict.fromkeys(variables.names, float("nan"))
         nothing = (0.0,) * len(start), origin, origin
         return Reliability(limit.joint, float("nan"), *nothing, False, None, None, None)
-    point = tuple(result.getPhysicalSpaceDesignPoint())
-    shares = result.getImportanceFactors()
-    index = result.getHasoferReliabilityIndex()
-    fails = result.getIsStandardPointOriginInFailureSpace()
-    status = result.getOptimizationResult().getStatus()
-    second = limit.run(ot.SORM(solver, event))
     return Reliability(
         joint=limit.joint,
-        beta=-index if fails else index,
-        point=point,
-        design=variables.values(point),
-        importance={n: float(s) for n, s in zip(variables.names, shares, strict=True)},
-        converged=status == ot.OptimizationResult.SUCCESS,
-        form=float(result.getEventProbability()),
-        breitung=probability_of(second.getEventProbabilityBreitung),
-        tvedt=probability_of(second.getEventProbabilityTvedt),
+        beta=-found.distance if found.median_fails else found.distance,
+        point=found.point,
+        design=variables.values(found.point),
+        importance=dict(zip(variables.names, found.importance, strict=True)),
+        converged=found.converged,
+        form=found.form,
+        breitung=found.breitung,
+        tvedt=found.tvedt,
     )
 
 
-def probability_of(method: Callable[[], float]) -> float | None:
-    """A probability by a method of OpenTURNS, None if a curvature does not allow it."""
-    try:
-        value = float(method())
-    except Exception:
-        return None
-    return value if 0 < value < 1 else None
-
-
 def sampled(
-    limit: LimitState, normal: Any, around: Sequence[Reliability], number: int, seed: int
+    limit: LimitState,
+    library: OpenTurns,
+    around: Sequence[Reliability],
+    number: int,
+    seed: int,
 ) -> tuple[float, float, float]:
     """Probability of failure by importance sampling around design points, and the limits of its
     interval: that of a sum of weighted Poisson numbers [Fay and Feuer 1997], with the variance of
     the weights. That of the normal distribution is too narrow above where few samples with large
     weights decide. Raises InputError, RunError.
     """
-    ot = openturns()
-    deviations, matrix = normal.getStandardDeviation(), normal.getCorrelation()
-    parts = [ot.Normal(list(one.point), deviations, matrix) for one in around]
-    density = parts[0] if len(parts) == 1 else ot.Mixture(parts)
-    ot.RandomGenerator.SetSeed(seed)
-    points = density.getSample(number)
-    logs = np.ravel(normal.computeLogPDF(points)) - np.ravel(density.computeLogPDF(points))
+    ranks, centres = limit.levels.variables.rank_correlations(), [one.point for one in around]
+    points, logs = library.result(points_around, ranks, centres, number, seed)
     blocks = [points[i : i + BLOCK] for i in range(0, number, BLOCK)]
     fails = np.concatenate([np.ravel(limit.evaluated(block, False)) < 0 for block in blocks])
     return weighted_share(np.exp(logs), fails)
@@ -599,23 +515,26 @@ def analysed(
 
     Raises InputError, RunError.
     """
-    normal, several = levels.variables.normal(), levels.case.joint_names
+    several = levels.case.joint_names
     joints = list(several) if len(several) > 1 else []
     single: list[Reliability] = []
     origin = [0.0] * len(levels.variables.names)
-    for joint in [*joints, ""]:
-        limit = LimitState(levels, joint)
-        where = f"{joint}: " if joint else ""
-        on_progress(f"{where}design point")
-        nearest = min((s for s in single if s.form), key=lambda s: s.beta, default=None)
-        result = design_point(limit, normal, nearest.point if nearest else origin)
-        if samples:
-            on_progress(f"{where}{samples} samples")
-            around = [s for s in (*([] if joint else single), result) if s.form] or [result]
-            share = sampled(limit, normal, around, samples, seed)
-            result = replace(result, sampled=share[0], low=share[1], high=share[2], samples=samples)
-        single.append(result)
-        yield result
+    with openturns() as library:
+        for joint in [*joints, ""]:
+            limit = LimitState(levels, joint)
+            where = f"{joint}: " if joint else ""
+            on_progress(f"{where}design point")
+            nearest = min((s for s in single if s.form), key=lambda s: s.beta, default=None)
+            result = design_point(limit, library, nearest.point if nearest else origin)
+            if samples:
+                on_progress(f"{where}{samples} samples")
+                around = [s for s in (*([] if joint else single), result) if s.form] or [result]
+                share = sampled(limit, library, around, samples, seed)
+                result = replace(
+                    result, sampled=share[0], low=share[1], high=share[2], samples=samples
+                )
+            single.append(result)
+            yield result
 
 
 def design_case(levels: CriticalLevels, result: Reliability) -> Case:

@@ -18,7 +18,7 @@ from ..progress import Progress
 from ..session import session
 from ..storage import atomic_write
 from ..units import with_slash
-from . import reliability_picture, sampling
+from . import openturns_process, reliability_picture, sampling
 from .plan import quantity_of
 from .reliability import (
     CriticalLevels,
@@ -28,7 +28,6 @@ from .reliability import (
     cells_of,
     columns_of,
     design_case,
-    openturns,
 )
 from .result_file import result_file
 from .sweep import scheduler_client, search_of
@@ -54,10 +53,10 @@ def reliability(
     Returns that of each of several joints, then that of all; and the printed lines. Raises
     InputError, RunError.
     """
-    openturns()
+    openturns_process.version()  # checks that it is installed
     check_jobs(jobs)
     search_of(case, "level")  # checks the case
-    variables.normal()
+    variables.rank_correlations()
     rows, columns = out / ROWS, columns_of(variables)
     keep = of_same_columns(rows, columns)
     with scheduler_client(scheduler) as client, session(case, out, keep) as study:
@@ -130,7 +129,7 @@ def as_json(levels: CriticalLevels, results: Sequence[Reliability]) -> dict[str,
         "distributions": dict(variables.distributions),
         "correlate": list(variables.correlate),
         "tied": dict(variables.tied),
-        "openturns": openturns().__version__,
+        "openturns": openturns_process.version(),
         "critical_levels": len(levels.used),
         "not_confirmed": levels.unconfirmed,
         "undecided": levels.undecided,

@@ -138,15 +138,8 @@ def correlated(shares: Array, pairs: list[tuple[int, int, float]]) -> Array:
     of the ranks, iteratively; the best order is returned. Raises InputError.
     """
     number, inputs = shares.shape
-    wanted = np.eye(inputs)
-    for i, j, rank in pairs:
-        wanted[i, j] = wanted[j, i] = rank
-    try:
-        root = copula(wanted)
-    except linalg.LinAlgError:
-        raise InputError(
-            "--correlate: must form a positive definite matrix of correlations"
-        ) from None
+    wanted = rank_correlations(pairs, inputs)
+    root = copula(wanted)
     scores, corrected = stats.norm.ppf(shares), wanted
     orders: list[tuple[float, IntArray]] = []
     if number > inputs:
@@ -165,6 +158,22 @@ def correlated(shares: Array, pairs: list[tuple[int, int, float]]) -> Array:
             break
     _, ranks = min(orders, key=lambda order: order[0])
     return np.take_along_axis(np.sort(shares, axis=0), ranks, axis=0)
+
+
+def rank_correlations(pairs: list[tuple[int, int, float]], inputs: int) -> Array:
+    """The matrix of rank correlations of inputs, of which some pairs have one. Raises InputError if
+    it is not that of any Gaussian copula.
+    """
+    ranks = np.eye(inputs)
+    for i, j, rank in pairs:
+        ranks[i, j] = ranks[j, i] = rank
+    try:
+        copula(ranks)
+    except linalg.LinAlgError:
+        raise InputError(
+            "--correlate: must form a positive definite matrix of correlations"
+        ) from None
+    return ranks
 
 
 def copula(ranks: Array) -> Array:
