@@ -31,7 +31,7 @@ class ProcessKilled(RunError):
 
 
 @contextlib.contextmanager
-def pool_of(jobs: int) -> Iterator[ProcessPoolExecutor]:
+def process_pool(jobs: int) -> Iterator[ProcessPoolExecutor]:
     """Processes that end with their parent, even if it is killed, and after an error in a process
     or in the caller. Raises ProcessKilled if one of them is killed.
     """
@@ -68,7 +68,7 @@ def check_jobs(jobs: int | None) -> None:
         raise InputError(f"jobs = {jobs}: must be an integer >= 1")
 
 
-def number_of(jobs: int | None, tasks: int) -> int:
+def process_count(jobs: int | None, tasks: int) -> int:
     """Number of processes for so many tasks; jobs: at most, by default one per core."""
     return min(jobs or os.cpu_count() or 1, tasks)
 
@@ -77,7 +77,7 @@ def as_finished(
     work: Callable[[Item], Result], items: Sequence[Item], jobs: int
 ) -> Iterator[tuple[int, Result]]:
     """(number, result) of each item as its work is finished in one of several processes."""
-    with pool_of(jobs) as pool:
+    with process_pool(jobs) as pool:
         waiting = {pool.submit(work, item): number for number, item in enumerate(items)}
         for future in as_completed(waiting):
             yield waiting[future], future.result()
@@ -97,7 +97,7 @@ def in_processes(
     jobs: number of processes, by default one per core. Raises InputError.
     """
     check_jobs(jobs)
-    several = number_of(jobs, len(items))
+    several = process_count(jobs, len(items))
     if several == 1:
         yield from ((number, work(item, True)) for number, item in enumerate(items))
     else:

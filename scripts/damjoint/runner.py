@@ -14,7 +14,7 @@ from .fem.memory import seconds, sizes
 from .input.case import Case
 from .model.results import Results
 from .progress import INTERVAL, Progress
-from .session import Session, end_of, session
+from .session import Session, session, study_end
 
 if TYPE_CHECKING:  # runs without a picture do not load it
     from .pictures.drawing_process import DrawingProcess
@@ -121,7 +121,7 @@ def early_end(result: Results, error: BaseException | None) -> tuple[str, str]:
     """State (failed or interrupted) and message of a scene that an error ended; else empty."""
     last = result.last
     where = f" after level {last['level']:.6g} m" if last else " before the first step"
-    return end_of(error, where)
+    return study_end(error, where)
 
 
 def write_fields_and_pictures(

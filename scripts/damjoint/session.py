@@ -25,7 +25,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-def end_of(error: BaseException | None, where: str = "") -> tuple[str, str]:
+def study_end(error: BaseException | None, where: str = "") -> tuple[str, str]:
     """State of a study that an error has ended, failed or interrupted, and its message; both empty
     without an error. where: how far it had come.
     """
@@ -67,7 +67,7 @@ class Record:
             yield
         except BaseException as error:
             if not self.ended:
-                state, _ = end_of(error)
+                state, _ = study_end(error)
                 self.save_without_results(state, str(error) or self.reached)
             raise
         finally:
@@ -173,7 +173,7 @@ def several(
                 done[number] = result
                 yield [done[k] for k in sorted(done)]
         except BaseException as error:
-            state, _ = end_of(error)
+            state, _ = study_end(error)
             for folder in items:
                 info = folders.read_info(folder) or {}
                 if info.get("state") == "running":

@@ -120,7 +120,7 @@ def cached(kind: str, key: str, compute: Callable[[], Any]) -> Any:
     return value
 
 
-def text_of(path: Path, name: str, most: int) -> str:
+def read_limited_text(path: Path, name: str, most: int) -> str:
     """The text of a regular file of at most `most` bytes; name: of the file in a message.
 
     Raises InputError.

@@ -21,7 +21,7 @@ from damjoint.fem.condensation import condense
 from damjoint.input.case import Case
 from damjoint.input.resolve import load
 from damjoint.joint.interface import Interface, interface_of
-from damjoint.processes import pool_of
+from damjoint.processes import process_pool
 from damjoint.progress import track
 from damjoint.runner import run
 from damjoint.solver.load_stepper import LoadStepper
@@ -285,7 +285,7 @@ def stress(measurements: Measurements) -> Table:
     grid = grid[::18] if measurements.short else grid
     measured = "end", "level", "iterations", "cuts", "seconds"
     table = Table("stress", "law", "aperture_min", "K_N", "E", *measured)
-    with pool_of(os.cpu_count() or 1) as pool:
+    with process_pool(os.cpu_count() or 1) as pool:
         ends = {
             values: pool.submit(run_of_grid, *values)
             for values in grid

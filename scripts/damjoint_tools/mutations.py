@@ -17,7 +17,7 @@ from pathlib import Path
 
 import damjoint
 from damjoint import RunError
-from damjoint.processes import pool_of
+from damjoint.processes import process_pool
 from damjoint.progress import track
 from damjoint.studies.result_file import rows_session
 
@@ -501,7 +501,7 @@ def mutate(seed: int, out: Path, jobs: int | None = None) -> list[dict[str, str]
     with rows_session("mutate", out, COLUMNS, (), about) as (study, done):
         same_code(out, done.values(), now)
         missing = [k for k, mutation in enumerate(MUTATIONS) if mutation.name not in done]
-        with pool_of(jobs or os.cpu_count() or 1) as pool:
+        with process_pool(jobs or os.cpu_count() or 1) as pool:
             waiting = [pool.submit(look_for_number, k, seed) for k in missing]
             for future in track(as_completed(waiting), "mutate", len(waiting)):
                 cells = future.result() | now

@@ -135,7 +135,7 @@ def random_quake(seed: int, number: int, folder: Path) -> RandomQuake:
 
 def with_transient(scene: RandomQuake, rng: RandomNumbers) -> RandomQuake:
     """A scene, some of those with flow with that of the water in time while the earthquake acts,
-    and of these some with drains.
+    and of these some with drains, some with turbulent flow (half of them of a thin liquid).
     """
     waters = set(np.ravel(scene.settings["uplift"]))
     if not rng.event(0.5) or "flow" not in waters or "cracked" in waters:
@@ -145,6 +145,10 @@ def with_transient(scene: RandomQuake, rng: RandomNumbers) -> RandomQuake:
         place = rng.uniform(0.05, 0.2) * scene.settings["dam_base"]
         drawn |= {"drains": 1, "drain_x": float(f"{place:.3g}")}
         drawn["drain_effectiveness"] = rng.uniform(0.2, 0.9)
+    if rng.event(0.5):
+        drawn["turbulent"] = 1
+        if rng.event(0.5):
+            drawn["visc"] = rng.log_uniform(1e-6, 1e-3)
     return replace(scene.changed(**drawn), checks=())
 
 

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from damjoint import InputError, RunError
-from damjoint.processes import pool_of
+from damjoint.processes import process_pool
 from damjoint.progress import track
 from damjoint.studies.result_file import rows_session
 from damjoint_witness import again
@@ -192,11 +192,11 @@ def computed_again(
     findings, numbers = list[object](), dict[str, Any]()
     if row["class"] == VERIFIED:
         doubled = run_of(replace(scene, steps=2 * scene.steps), folder, name="doubled").files
-        findings += again.other_steps(run.asked, run.files, doubled)
+        findings += again.other_steps(run.request, run.files, doubled)
         if not doubled.stopped:
             numbers["steps_difference"] = again.difference(run.files, doubled)
     case = scene.case
-    if case["dim"] == 2 and not again.follows_history(run.asked, first_step=False):
+    if case["dim"] == 2 and not again.follows_history(run.request, first_step=False):
         more, differences = critical_levels(scene, case["dam_height"], folder)
         findings, numbers = [*findings, *more], numbers | differences
     if findings:
@@ -232,18 +232,18 @@ def critical_levels(
         if below.files.stopped:
             findings.append(f"no equilibrium at {again.BELOW:g} of the critical level")
         else:
-            findings += again.above(first, below.files, below.asked, below.steps)
+            findings += again.above(first, below.files, below.request, below.steps)
     return findings, numbers
 
 
 def verified(run: Witness) -> dict[str, object]:
     """Verify a run; returns its class, findings and size."""
-    quake, stopped = run.asked.command == "quake", run.files.stopped
+    quake, stopped = run.request.command == "quake", run.files.stopped
     broken = run.violations()
     wrong, remark = run.stop() if stopped else (False, "")
     fine = UNDECIDED if remark else JUSTIFIED if stopped else VERIFIED
     rows = run.shaken.rows if quake else run.files.history
-    levels = run.asked.levels[-1:] if quake else rows["level"]
+    levels = run.request.levels[-1:] if quake else rows["level"]
     return {
         "class": DEFECT if broken or wrong else fine,
         "findings": "; ".join(filter(None, [*broken, remark])),
@@ -284,7 +284,7 @@ def rows_as_completed(
     """
     # removed by this process, as the others may be killed, with their commands
     folder = tempfile.TemporaryDirectory(prefix="damjoint-", ignore_cleanup_errors=True)
-    with folder as name, pool_of(jobs) as pool:
+    with folder as name, process_pool(jobs) as pool:
         waiting = [pool.submit(row_of, *scene, records, Path(name)) for scene in scenes]
         yield from (future.result() for future in as_completed(waiting))
 

@@ -279,6 +279,7 @@ FEATURES_OF_QUAKES = {
     "published scheme": "time_integration=published",
     "flow in time": "quake_uplift=transient",
     "flow in time, with drains": rf"(?=.* quake_uplift=transient){FLOWS_WITH_DRAINS}",
+    "flow in time, turbulent": "turbulent=1",
 }
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from . import stops
 from .files import Files, Table, read_table, split_by
-from .reader import Asked
+from .reader import Request
 
 #: Difference of jumps between two numbers of steps, over the largest jump (theory, section 8).
 SAME_STATE = 1e-6
@@ -43,32 +43,32 @@ UNSTABLE = "unstable crack growth"
 # --------------------------------------------------------------------------------------------------
 
 
-def follows_history(asked: Asked, first_step: bool = True) -> bool:
+def follows_history(request: Request, first_step: bool = True) -> bool:
     """Return whether the state under rising water may depend on the way there: where a joint slips
     under a load that the water turns back (temperature; earthquake and anchor against the water),
     grouting and sawing, a first step that bears the weight with a part of the water (unless
     first_step is false: it is the same), a controlled displacement; where water flows in time.
     """
-    first = asked.joints[0]
+    first = request.joints[0]
     heat = any(first[f"temperature_{part}"] for part in ("dam", "linear", "found"))
-    works = any(v["grout_pressure"] or v["saw_thickness"] for v in asked.joints)
+    works = any(v["grout_pressure"] or v["saw_thickness"] for v in request.joints)
     against = first["k_h"] < 0 or (first["anchor_force"] > 0 and first["anchor_angle"] > 0)
     driven = first["drive"] != "level" or (first_step and not first["weight_first"])
     return bool(heat or works or against or driven or first["time_unit"])
 
 
-def follows_steps(asked: Asked, *records: dict[str, Any]) -> bool:
+def follows_steps(request: Request, *records: dict[str, Any]) -> bool:
     """Return whether a state may depend on the load steps: on the history; after levels that fall;
     of water that enters a crack after the step that has opened it; after unstable crack growth; of
     a weight that has not converged alone; of slip whose direction in a 3D joint turns, which a step
     takes as constant.
     """
-    falls = any(list(levels) != sorted(levels) for levels in (asked.levels, asked.tail_levels))
+    falls = any(list(levels) != sorted(levels) for levels in (request.levels, request.tail_levels))
     names = "unstable_growth", "limit_points", "weight_with_water"
     unstable = any(record.get(name) for record in records for name in names)
-    entering = any(v["uplift"] == "cracked" for v in asked.joints)
-    turns = asked.joints[0]["dim"] == 3 and any(v["law"] != "rupture" for v in asked.joints)
-    return follows_history(asked) or falls or unstable or entering or turns
+    entering = any(v["uplift"] == "cracked" for v in request.joints)
+    turns = request.joints[0]["dim"] == 3 and any(v["law"] != "rupture" for v in request.joints)
+    return follows_history(request) or falls or unstable or entering or turns
 
 
 def difference(one: Files, other: Files) -> float:
@@ -101,9 +101,9 @@ def goes_back(steps: Table) -> bool:
     return bool(np.any([*ends, turns]))
 
 
-def other_steps(asked: Asked, one: Files, other: Files) -> Iterator[str]:
+def other_steps(request: Request, one: Files, other: Files) -> Iterator[str]:
     """Yield how the last state differs between two numbers of load steps; other: with more."""
-    if one.stopped or other.stopped or follows_steps(asked, one.record, other.record):
+    if one.stopped or other.stopped or follows_steps(request, one.record, other.record):
         return
     if goes_back(read_table(other.folder / "steps.csv")):
         return
@@ -143,13 +143,13 @@ def starts(found: Sequence[Critical]) -> Iterator[str]:
         yield f"critical levels from several starts: {', '.join(f'{x:.8g}' for x in levels)} m"
 
 
-def above(critical: Critical, files: Files, asked: Asked, steps: Table) -> Iterator[str]:
-    """Yield what statics says against a confirmed critical level; files, asked, steps: those of the
-    run to a level just below it.
+def above(critical: Critical, files: Files, request: Request, steps: Table) -> Iterator[str]:
+    """Yield what statics says against a confirmed critical level; files, request, steps: of the run
+    to a level just below it.
     """
-    if not critical.confirmed or not asked.sections or critical.mode == UNSTABLE:
+    if not critical.confirmed or not request.sections or critical.mode == UNSTABLE:
         return
-    beyond = replace(asked, levels=(ABOVE / BELOW * asked.levels[-1],))
+    beyond = replace(request, levels=(ABOVE / BELOW * request.levels[-1],))
     verdict = f"{critical.mode} on {critical.joint}" if critical.joint else critical.mode
     # the search omits the hardening that a case does not ask for
     plastic = steps | {"lambda": 0 * steps["lambda"]} if "lambda" in steps else steps

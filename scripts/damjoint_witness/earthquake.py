@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .files import Files, Table, read_table, rows_where, split_by, without_suffix
-from .reader import Asked, Section, Values, differences
+from .reader import RequestedJoint, Values, differences
 from .statics import along_joint, loads, weight
 from .stops import Joint, equilibrium_is_certain
 from .tables import DIGITS, rows_of_nodes, updates_of
@@ -49,28 +49,15 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Shaken:
+class Shaken(RequestedJoint):
     """A joint of a dam in an earthquake: its tables, and forces by hand."""
 
     files: Files
-    asked: Asked
-    #: number of the joint, from 0
-    number: int = 0
-
-    @property
-    def values(self) -> Values:
-        """Its parameters."""
-        return self.asked.joints[self.number]
-
-    @property
-    def section(self) -> Section:
-        """The section above it."""
-        return self.asked.sections[self.number]
 
     @property
     def joints(self) -> list[Shaken]:
         """All joints."""
-        return [Shaken(self.files, self.asked, k) for k in range(len(self.asked.joints))]
+        return [Shaken(self.request, k, self.files) for k in range(len(self.request.joints))]
 
     @property
     def found(self) -> dict[str, Any]:
@@ -91,19 +78,19 @@ class Shaken:
     @property
     def size(self) -> float:
         """Weight of the dam [N/m], the scale of all forces."""
-        return weight(self.asked.sections[0], self.asked.joints[0])
+        return weight(self.request.sections[0], self.request.joints[0])
 
     def static_row(self, after: bool = False) -> dict[str, float]:
         """The row of history.csv of the static loads, or that after the earthquake."""
         table = self.files.history_of(self.number)
-        time = self.asked.times[-1] if not after else len(self.asked.levels) + 1
+        time = self.request.times[-1] if not after else len(self.request.levels) + 1
         k = int(np.argmin(np.abs(table["time"] - time)))
         return {name: float(column[k]) for name, column in table.items()}
 
     def by_hand(self, **values: float) -> Array:
         """T, N + U and M + M_U (3,) of all static loads, with other values of parameters."""
-        levels, tails = self.asked.levels[-1], self.asked.tail_levels[-1]
-        total = loads(self.section, self.values | values, self.asked.times[-1], levels, tails)
+        levels, tails = self.request.levels[-1], self.request.tail_levels[-1]
+        total = loads(self.section, self.values | values, self.request.times[-1], levels, tails)
         N, T, M = along_joint(self.section, total)
         return np.array([T, N, M])
 
@@ -157,7 +144,7 @@ class Shaken:
 def bookkeeping(whole: Shaken) -> Iterator[str]:
     """Check parameters, rows, frames, the ground's acceleration and the exit code."""
     files, rows = whole.files, whole.rows
-    yield from differences(whole.asked, files.record)
+    yield from differences(whole.request, files.record)
     reserve = "shear_reserve"  # inf with a law that does not limit the shear
     finite = (np.isfinite(v) | (reserve in name) & np.isposinf(v) for name, v in rows.items())
     if not all(values.all() for values in finite):
@@ -193,7 +180,7 @@ def ground_motion(whole: Shaken, times: Array) -> tuple[Array, float]:
     """The ground's acceleration (n, 2) at times (n,), and the end of record and rest [s]; of a
     record that starts at t = 0 with no acceleration; before the rest it ends within an interval.
     """
-    v, path = whole.values, whole.asked.record
+    v, path = whole.values, whole.request.record
     assert path
     # without comments and heading
     lines = (line for line in path.read_text().splitlines() if line[:1].isdigit())
@@ -235,7 +222,7 @@ def start(joint: Shaken) -> Iterator[str]:
     """Check that the first frame is the static state."""
     first = joint.frames[0]
     still = joint.files.tables_of(joint.number)
-    static = next(rows for rows in still if rows["time"][0] == joint.asked.times[-1])
+    static = next(rows for rows in still if rows["time"][0] == joint.request.times[-1])
     for name in ("delta_n", "delta_t1", "sigma_n", "tau_1", "p"):
         if np.abs(first[name] - static[name]).max() > DIGITS * np.abs(static[name]).max():
             yield f"quake_joint.csv: {name} does not start at the static state"
@@ -243,16 +230,16 @@ def start(joint: Shaken) -> Iterator[str]:
 
 def mass_damping(joint: Shaken) -> float:
     """a0 [1/s] of Rayleigh's damping, 0 without the part of the mass."""
-    v, own = joint.values, joint.found["frequencies"]
-    ends = (v["damping_f1"], own[0]), (v["damping_f2"], own[-1])
+    v, frequencies = joint.values, joint.found["frequencies"]
+    ends = (v["damping_f1"], frequencies[0]), (v["damping_f2"], frequencies[-1])
     w1, w2 = (2 * np.pi * (computed if given == -1 else given) for given, computed in ends)
     return float((v["damping_mass"] > 0) * 2 * v["damping"] * w1 * w2 / (w1 + w2))
 
 
 def at_points(joint: Shaken, steps: Table) -> tuple[list[Table], Table]:
     """The rows of the integration points after each time step, and in the static state before."""
-    own = rows_where(steps, (steps["joint"] == joint.number + 1) & (steps["weight"] > 0))
-    updates = split_by(own, "update")
+    rows = rows_where(steps, (steps["joint"] == joint.number + 1) & (steps["weight"] > 0))
+    updates = split_by(rows, "update")
     moving = [u for u in updates if u["earthquake"][0]]
     first = next(n for n, u in enumerate(updates) if u["earthquake"][0])
     return moving, updates[first - 1]
@@ -343,7 +330,7 @@ def standing(whole: Shaken, steps: Table) -> Iterator[str]:
     if not found or found["equilibrium"]:
         return
     last = (
-        Joint(joint.files, joint.asked, joint.number, at_points(joint, steps)[0][-1])
+        Joint(joint.request, joint.number, joint.files, at_points(joint, steps)[0][-1])
         for joint in whole.joints
     )
     if all(map(equilibrium_is_certain, last)):

@@ -49,9 +49,9 @@ from skfem.helpers import ddot, div, sym_grad, trace
 from skfem.refdom import RefHex, RefWedge
 
 from .files import Files, Table, rows_where
-from .reader import Asked, Point, Values, section_above_base
+from .reader import Point, Request, Values, section_above_base
 from .solids import (
-    PLACES,
+    REFERENCE_POINTS,
     ROCK,
     SAME,
     SHAPES,
@@ -63,7 +63,7 @@ from .solids import (
     on_segment,
     read_solids,
 )
-from .water import Heads, JointState, heads_of, places, pressure
+from .water import Heads, JointState, coordinates, heads_of, pressure
 from .water import states as joint_states
 from .water_in_time import heads_in_time
 
@@ -84,14 +84,14 @@ DISTINCT, RAISE = 1e-3, 0.01
 
 class ElementWedge2(ElementH1):  # type: ignore[misc]
     """Prism with products of the quadratic functions of its triangle and its axis; all functions
-    are interior, as equal places are joined by `Stiffness`.
+    are interior, as equal points are joined by `Stiffness`.
     """
 
     interior_dofs = 18
     maxdeg = 4
     dofnames = ("u",) * 18
     refdom = RefWedge
-    doflocs = np.array([(*p, z) for z in (0, 1, 0.5) for p in PLACES["triangle"]], float)
+    doflocs = np.array([(*p, z) for z in (0, 1, 0.5) for p in REFERENCE_POINTS["triangle"]], float)
 
     def lbasis(self, X: Any, i: int) -> tuple[Any, Any]:
         """Value and gradient of function i."""
@@ -150,11 +150,11 @@ def quadrature(shape: str, order: int) -> tuple[Array, Array]:
     flat, area = three
     if order == 2:  # degree 5, with 7 points
         s = math.sqrt(15)
-        places, areas = [(1 / 3, 1 / 3)], [9 / 80]
+        coordinates, areas = [(1 / 3, 1 / 3)], [9 / 80]
         for b, part in (((6 - s) / 21, (155 - s) / 2400), ((6 + s) / 21, (155 + s) / 2400)):
-            places += [(b, b), (1 - 2 * b, b), (b, 1 - 2 * b)]
+            coordinates += [(b, b), (1 - 2 * b, b), (b, 1 - 2 * b)]
             areas += [part] * 3
-        flat, area = np.array(places).T, np.array(areas)
+        flat, area = np.array(coordinates).T, np.array(areas)
     points = [np.append(flat[:, i], z) for z in line for i in range(len(area))]
     return np.array(points).T, np.outer(on_line, area).ravel()
 
@@ -249,19 +249,19 @@ class Face:
 
 def faces_between(corners: Sequence[Point], heights: Sequence[float], upstream: bool) -> list[Face]:
     """Return the straight faces of a polyline, cut at the heights of its joints."""
-    places = {y: x for x, y in corners}
+    coordinates = {y: x for x, y in corners}
     xs, ys = np.array(corners).T
     if (np.diff(ys) <= 0).any():
         return []
     for y in heights:
         if ys[0] < y < ys[-1] and min(abs(ys - y)) > SAME * ys[-1]:
-            places[y] = float(np.interp(y, ys, xs))
-    ends = [(places[y], y) for y in sorted(places)]
+            coordinates[y] = float(np.interp(y, ys, xs))
+    ends = [(coordinates[y], y) for y in sorted(coordinates)]
     return [Face(foot, top, upstream) for foot, top in pairwise(ends)]
 
 
 def x_at(face: Sequence[Point], y: Any) -> Any:
-    """Return the place of a face at heights, that of its end beyond its ends [m]."""
+    """Return the position of a face at heights, that of its end beyond its ends [m]."""
     x, heights = np.array(face).T
     return np.interp(y, heights, x)
 
@@ -270,7 +270,7 @@ def x_at(face: Sequence[Point], y: Any) -> Any:
 class Loads:
     """Loads at a time: levels of reservoir and tailwater [m]."""
 
-    asked: Asked
+    request: Request
     time: float
     level: float
     tail: float
@@ -278,7 +278,7 @@ class Loads:
     @property
     def values(self) -> Values:
         """Parameters of the first joint, which are those of bodies and loads."""
-        return self.asked.joints[0]
+        return self.request.joints[0]
 
     def part(self, name: str) -> float:
         """Return the factor of a load."""
@@ -296,22 +296,22 @@ class Loads:
         return Liquid(self.level, zangar=zangar_coefficient(v, self.level) / 2 * size)
 
     def lines(self) -> dict[str, tuple[Point, Array]]:
-        """Return places and forces [N/m] of the loads on lines, by name."""
+        """Return points and forces [N/m] of the loads on lines, by name."""
         v, whole = self.values, section_above_base(self.values)
         angle = math.radians(v["anchor_angle"])
         anchor = -v["anchor_force"] * np.array([math.sin(angle), math.cos(angle)])
         forces = np.array([v["force_x"], v["force_y"]])
         sides = {"upstream": whole.upstream, "downstream": whole.downstream}
 
-        def place(face: str, at: float) -> Point:
+        def point_at(face: str, at: float) -> Point:
             if face == "crest":
                 return v["batter"] + at, v["dam_height"]
             return x_at(sides[face], at), at
 
         found = {
-            "ice": (place("upstream", v["ice_level"]), np.array([v["ice_force"], 0.0])),
-            "force": (place(v["force_face"], v["force_at"]), forces),
-            "anchor": (place("crest", v["anchor_at"]), anchor),
+            "ice": (point_at("upstream", v["ice_level"]), np.array([v["ice_force"], 0.0])),
+            "force": (point_at(v["force_face"], v["force_at"]), forces),
+            "anchor": (point_at("crest", v["anchor_at"]), anchor),
         }
         return {n: (at, self.part(n) * force) for n, (at, force) in found.items() if force.any()}
 
@@ -350,7 +350,7 @@ def zangar_coefficient(values: Values, level: float) -> float:
 
 @dataclass(frozen=True)
 class Stiffness:
-    """Finite elements of a body: places of its functions (n, 3), stiffness and loads; degree of
+    """Finite elements of a body: points of its functions (n, 3), stiffness and loads; degree of
     freedom dim * function + component.
     """
 
@@ -368,11 +368,12 @@ class Stiffness:
         for shape, table, region in self.solid.cells:
             mesh_type, *elements = KINDS[shape]
             used, numbers = np.unique(table, return_inverse=True)
-            own = numbers.reshape(table.shape).T
+            corners = numbers.reshape(table.shape).T
             if shape == "hexahedron":
-                own = own[[GMSH_HEXAHEDRON.index((x, y, z)) for x, y, z in RefHex.p.T.tolist()]]
+                order = [GMSH_HEXAHEDRON.index((x, y, z)) for x, y, z in RefHex.p.T.tolist()]
+                corners = corners[order]
             points = self.solid.points[used, : self.dim].T
-            mesh = mesh_type(np.ascontiguousarray(points), np.ascontiguousarray(own))
+            mesh = mesh_type(np.ascontiguousarray(points), np.ascontiguousarray(corners))
             element = ElementVector(elements[self.order - 1]())
             rule = quadrature(shape, self.order)
             bases.append((Basis(mesh, element, quadrature=rule), region))
@@ -381,13 +382,13 @@ class Stiffness:
     @cached_property
     def numbers(self) -> tuple[Array, list[Any]]:
         """Places of the functions (n, 3), and the degree of freedom of each of those of a part."""
-        places = np.concatenate([basis.doflocs.T for basis, _ in self._bases])
-        pairs = cKDTree(places).query_pairs(SAME * self.solid.size, output_type="ndarray")
-        links = sparse.coo_matrix((np.ones(len(pairs)), pairs.T), (len(places),) * 2)
+        coordinates = np.concatenate([basis.doflocs.T for basis, _ in self._bases])
+        pairs = cKDTree(coordinates).query_pairs(SAME * self.solid.size, output_type="ndarray")
+        links = sparse.coo_matrix((np.ones(len(pairs)), pairs.T), (len(coordinates),) * 2)
         _, function = connected_components(links, directed=False)
         _, first = np.unique(function, return_index=True)
         at = np.zeros((len(first), 3))
-        at[:, : self.dim] = places[first]
+        at[:, : self.dim] = coordinates[first]
         dofs, start = [], 0
         for basis, _ in self._bases:
             component = np.empty(basis.N, int)
@@ -398,18 +399,18 @@ class Stiffness:
         return at, dofs
 
     @property
-    def places(self) -> Array:
+    def coordinates(self) -> Array:
         """Places of the functions (n, 3)."""
         return self.numbers[0]
 
     @cached_property
     def tree(self) -> Any:
-        """Tree of the places."""
-        return cKDTree(self.places)
+        """Tree of the points."""
+        return cKDTree(self.coordinates)
 
-    def find(self, places: Array) -> IntArray:
-        """Return the functions at places (..., 3)."""
-        distance, found = self.tree.query(places)
+    def find(self, coordinates: Array) -> IntArray:
+        """Return the functions at points (..., 3)."""
+        distance, found = self.tree.query(coordinates)
         if distance.max(initial=0) > SAME * self.solid.size:
             raise ValueError("the meshes of two bodies differ at their joint")
         return np.asarray(found)
@@ -423,18 +424,18 @@ class Stiffness:
     @cached_property
     def matrix(self) -> Any:
         """Stiffness [N/m]."""
-        size = self.dim * len(self.places)
+        size = self.dim * len(self.coordinates)
         total = sparse.csr_matrix((size, size))
         for (basis, region), dofs in zip(self._bases, self.numbers[1], strict=True):
             lam, mu = self.lame(region)
-            own = elastic_energy.assemble(basis, lam=lam, mu=mu).tocoo()
-            entries = own.data, (dofs[own.row], dofs[own.col])
+            part = elastic_energy.assemble(basis, lam=lam, mu=mu).tocoo()
+            entries = part.data, (dofs[part.row], dofs[part.col])
             total = total + sparse.coo_matrix(entries, (size, size)).tocsr()
         return total
 
     def volume_load(self, load: Callable[[int], tuple[Any, Callable[[Any], Any]]]) -> Array:
         """Return the forces of a density [N/m3] and of a free thermal strain, by region."""
-        total = np.zeros(self.dim * len(self.places))
+        total = np.zeros(self.dim * len(self.coordinates))
         for (basis, region), dofs in zip(self._bases, self.numbers[1], strict=True):
             density, strain = load(region)
             lam, mu = self.lame(region)
@@ -454,8 +455,8 @@ class Stiffness:
 
     def forces(self, sides: Sides, points: Any, traction: Array) -> Array:
         """Return the forces of tractions (q, 3) at points of sides."""
-        total = np.zeros((len(self.places), self.dim))
-        at = self.find(sides.places)[points.sides]
+        total = np.zeros((len(self.coordinates), self.dim))
+        at = self.find(sides.coordinates)[points.sides]
         weighted = (points.weights[:, None] * traction)[:, : self.dim]
         for k in range(at.shape[1]):
             np.add.at(total, at[:, k], points.functions[:, k, None] * weighted)
@@ -463,9 +464,9 @@ class Stiffness:
 
     def rigid_motions(self, held: NDArray[np.bool_]) -> Array:
         """Return the rigid motions (dofs, m) that leave held degrees of freedom at rest; those of
-        the body in the plane with one component held everywhere at some places.
+        the body in the plane with one component held everywhere at some points.
         """
-        x, y, z = (self.places - self.places.mean(axis=0)).T / self.solid.size
+        x, y, z = (self.coordinates - self.coordinates.mean(axis=0)).T / self.solid.size
         zero, one = 0 * x, 1 + 0 * x
         in_plane = [(one, zero, zero), (zero, one, zero), (-y, x, zero)]
         others = [(zero, zero, one), (z, zero, -x), (zero, -z, y)]
@@ -508,17 +509,16 @@ class Stiffness:
 class Dam:
     """The bodies of a scene, on one mesh."""
 
-    asked: Asked
+    request: Request
     solids: dict[str, Solid]
-    #: bodies above and below each joint
+    #: bodies above and below each joint, and the positions of its nodes
     joints: tuple[tuple[str, str], ...]
-    #: compliance of the bodies at the joints, once it is known
-    kept: list[Array] = field(default_factory=list, init=False)
+    nodes: tuple[Array, ...]
 
     @property
     def values(self) -> Values:
         """Parameters of the first joint, which are those of bodies and loads."""
-        return self.asked.joints[0]
+        return self.request.joints[0]
 
     @property
     def dim(self) -> int:
@@ -542,7 +542,7 @@ class Dam:
         hold_z the end faces along z.
         """
         v, body = self.values, self.bodies[name]
-        x, y, z = body.places.T
+        x, y, z = body.coordinates.T
         small = SAME * body.solid.size
         held = np.zeros((len(x), body.dim), bool)
         if name == "foundation":
@@ -559,24 +559,32 @@ class Dam:
             for name, body in self.bodies.items()
         }
 
-    def compliance(self, sides: Sequence[tuple[str, IntArray]]) -> Array:
-        """Return the jumps (m, m) of unit forces that part the joints; sides: as `dofs_of_sides`,
-        the same whenever it is called.
-        """
-        if not self.kept:
-            count = sum(len(dofs) for _, dofs in sides[::2])
-            moved = {name: np.zeros((len(self.held(name)), count)) for name in self.bodies}
-            i = 0
-            for above, below in zip(sides[::2], sides[1::2], strict=True):
-                for pair in zip(above[1], below[1], strict=True):
-                    for name, dof, sign in zip((above[0], below[0]), pair, (1, -1), strict=True):
-                        force = np.zeros(len(moved[name]))
-                        force[dof] = sign
-                        moved[name][:, i] += self.solvers[name](force)[0]
-                    i += 1
-            rows = [moved[name][dofs] for name, dofs in sides]
-            self.kept.append(np.concatenate(rows[::2]) - np.concatenate(rows[1::2]))
-        return self.kept[0]
+    @cached_property
+    def sides(self) -> list[tuple[str, IntArray]]:
+        """The bodies above and below each joint, and their degrees of freedom at its nodes."""
+        sides = []
+        for nodes, names in zip(self.nodes, self.joints, strict=True):
+            for name in names:
+                at = self.bodies[name].find(nodes)
+                sides.append((name, (self.dim * at[:, None] + np.arange(self.dim)).ravel()))
+        return sides
+
+    @cached_property
+    def compliance(self) -> Array:
+        """The jumps (m, m) of unit forces that part the joints."""
+        above, below = self.sides[::2], self.sides[1::2]
+        count = sum(len(dofs) for _, dofs in above)
+        moved = {name: np.zeros((len(self.held(name)), count)) for name in self.bodies}
+        i = 0
+        for (upper, upper_dofs), (lower, lower_dofs) in zip(above, below, strict=True):
+            for pair in zip(upper_dofs, lower_dofs, strict=True):
+                for name, dof, sign in zip((upper, lower), pair, (1, -1), strict=True):
+                    force = np.zeros(len(moved[name]))
+                    force[dof] = sign
+                    moved[name][:, i] += self.solvers[name](force)[0]
+                i += 1
+        rows = [moved[name][dofs] for name, dofs in self.sides]
+        return np.concatenate(rows[::2]) - np.concatenate(rows[1::2])
 
     # -- loads
 
@@ -600,8 +608,8 @@ class Dam:
         for sides, level in self.level_faces(body, loads):
             weight = v["rho_water"] * v["g"] * (level - sides.corners[0, 0, 1])
             total += body.side_load(sides, [0.0, -weight, 0.0])
-        for place, force in loads.lines().values():
-            total += self.on_line(body, place, force)
+        for point, force in loads.lines().values():
+            total += self.on_line(body, point, force)
         return total
 
     def on(self, start: Point, end: Point) -> Callable[[Array], NDArray[np.bool_]]:
@@ -611,9 +619,9 @@ class Dam:
     @cached_property
     def faces(self) -> list[Face]:
         """The straight faces of the concrete that water can load, each of one body."""
-        if self.asked.geometry:
-            return [Face(foot, top, True) for foot, top in UPSTREAM[self.asked.case]]
-        whole, sections = section_above_base(self.values), self.asked.sections
+        if self.request.geometry:
+            return [Face(foot, top, True) for foot, top in UPSTREAM[self.request.case]]
+        whole, sections = section_above_base(self.values), self.request.sections
         return [
             *faces_between(whole.upstream, [s.heel[1] for s in sections], True),
             *faces_between(whole.downstream, [s.toe[1] for s in sections], False),
@@ -624,7 +632,7 @@ class Dam:
         reservoir's floor and the bed of the tailwater.
         """
         v = self.values
-        if self.asked.geometry:
+        if self.request.geometry:
             return
         whole = section_above_base(v)
         (x1, _), (x0, y) = whole.crest
@@ -661,8 +669,8 @@ class Dam:
         """
         low, high = face.foot[1], face.top[1]
         if liquid.level <= low:
-            return np.zeros(body.dim * len(body.places))
-        if self.asked.geometry:
+            return np.zeros(body.dim * len(body.coordinates))
+        if self.request.geometry:
             return self.press_wet_part(body, sides, face, liquid)
         points, tilt = sides.points(), abs(face.normal[0])
         y, w = points.positions[:, 1], points.weights
@@ -683,7 +691,7 @@ class Dam:
 
     def press_wet_part(self, body: Stiffness, sides: Sides, face: Face, liquid: Liquid) -> Array:
         """Return the forces of a pressure [m] below its surface, in 2D."""
-        total = np.zeros(body.dim * len(body.places))
+        total = np.zeros(body.dim * len(body.coordinates))
         for corners in sides.corners:
             one = Sides(sides.shape, corners[None], sides.order)
             y0, y1 = corners[:, 1]
@@ -700,18 +708,18 @@ class Dam:
             total += body.forces(one, points, -pressure[:, None] * face.normal)
         return total
 
-    def on_line(self, body: Stiffness, place: Point, force: Array) -> Array:
-        """Return the forces of a force per metre on a line along z at a place of a body's surface,
+    def on_line(self, body: Stiffness, point: Point, force: Array) -> Array:
+        """Return the forces of a force per metre on a line along z at a point of a body's surface,
         where the mesh has nodes.
         """
-        total = np.zeros((len(body.places), body.dim))
-        away = np.linalg.norm(body.places[:, :2] - place, axis=1)
+        total = np.zeros((len(body.coordinates), body.dim))
+        away = np.linalg.norm(body.coordinates[:, :2] - point, axis=1)
         nodes = np.flatnonzero(away < SAME * self.solids["foundation"].size)
         if body.dim == 2:
             total[nodes, :2] = force
         elif len(nodes):
-            nodes = nodes[np.argsort(body.places[nodes, 2])]
-            ends = body.places[nodes[:: body.order]]
+            nodes = nodes[np.argsort(body.coordinates[nodes, 2])]
+            ends = body.coordinates[nodes[:: body.order]]
             sides = Sides("line", np.stack([ends[:-1], ends[1:]], axis=1), body.order)
             return body.side_load(sides, [*force, 0.0])
         return np.asarray(total.ravel(), float)
@@ -756,8 +764,8 @@ class JointForces:
         """Return the forces of the tractions on a body above the joint."""
         table = self.points
         traction = np.column_stack([table[k] for k in ("sigma_n_eff", "tau_1", "tau_2")])
-        positions = places(table)
-        width = float(np.ptp(places(self.nodes)[:, 2])) if body.dim == 3 else 1.0
+        positions = coordinates(table)
+        width = float(np.ptp(coordinates(self.nodes)[:, 2])) if body.dim == 3 else 1.0
         (sides,) = self.state.sides
         at = sides.at(positions, width * table["weight"])
         return -body.forces(sides, at, traction @ self.frame)
@@ -803,23 +811,34 @@ def wet_parts(corners: Array, beyond: Array) -> list[Array]:
     return [np.array([polygon[0], *polygon[i : i + 2]]) for i in range(1, len(polygon) - 1)]
 
 
-def violations(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
+def violations(files: Files, request: Request, steps: Table) -> Iterator[str]:
     """Yield where the jumps differ from those of the bodies under their loads and the tractions."""
     names = [(j["upper"], j["lower"]) for j in files.record["joints"]] or [("dam", "foundation")]
-    dam = Dam(asked, read_solids(files.folder / "fields"), tuple(names))
-    in_time = heads_in_time(files, asked, steps)
-    for update, states in joint_states(files, asked, steps):
-        own = rows_where(steps, steps["update"] == update)
+    written = list(written_states(files, request, steps))
+    if written:
+        nodes = tuple(coordinates(joint.nodes) for joint in written[0][0])
+        dam = Dam(request, read_solids(files.folder / "fields"), tuple(names), nodes)
+    for joints, loads, residual in written:
+        yield from jumps_at(dam, joints, loads, residual)
+
+
+def written_states(
+    files: Files, request: Request, steps: Table
+) -> Iterator[tuple[list[JointForces], Loads, float]]:
+    """Yield the joints, the loads and the residual of each state whose tables are written."""
+    in_time = heads_in_time(files, request, steps)
+    for update, states in joint_states(files, request, steps):
+        rows = rows_where(steps, steps["update"] == update)
         joints, stored = [], in_time.get(update, {})
         for joint, steady in zip(states, heads_of(states), strict=True):
             heads = stored.get(joint.number, steady)
             least = joint.values["pressure_min"] if joint.number in stored else 0.0
-            table = rows_where(own, own["joint"] == joint.number + 1)
+            table = rows_where(rows, rows["joint"] == joint.number + 1)
             nodes, points = (rows_where(table, (table["weight"] > 0) == w) for w in (False, True))
             joints.append(JointForces(joint, heads, nodes, points, least))
-        time, level, tail = (float(own[name][0]) for name in ("time", "level", "tail_level"))
+        time, level, tail = (float(rows[name][0]) for name in ("time", "level", "tail_level"))
         residual = residual_at(files, float(states[0].rows["time"][0]))
-        yield from jumps_at(dam, joints, Loads(asked, time, level, tail), residual)
+        yield joints, Loads(request, time, level, tail), residual
 
 
 def residual_at(files: Files, time: float) -> float:
@@ -880,7 +899,7 @@ class Fit:
         ends = dict(zip(motions, np.cumsum([m.shape[1] for m in motions.values()]), strict=True))
         columns = sum(m.shape[1] for m in motions.values())
         sides = []
-        for name, dofs in dofs_of_sides(dam, joints):
+        for name, dofs in dam.sides:
             moved = np.zeros((len(dofs), columns))
             if name in motions:
                 first = ends[name] - motions[name].shape[1]
@@ -892,26 +911,16 @@ class Fit:
         written = [joint.jumps(joint.nodes)[:, : dam.dim].ravel() for joint in joints]
         right = np.concatenate(written) - elastic
         fit = np.linalg.lstsq(matrix, right, rcond=None)[0]
-        largest = max(float(np.abs(own + moved @ fit).max()) for own, moved in sides)
+        largest = max(float(np.abs(elastic + moved @ fit).max()) for elastic, moved in sides)
         largest = max(largest, *(float(np.abs(jumps).max()) for jumps in written))
         return Fit(np.concatenate(written), right - matrix @ fit, matrix, largest)
-
-
-def dofs_of_sides(dam: Dam, joints: Sequence[JointForces]) -> Iterator[tuple[str, IntArray]]:
-    """Yield the bodies above and below each joint, and their degrees of freedom at its nodes."""
-    for joint, names in zip(joints, dam.joints, strict=True):
-        for name in names:
-            body = dam.bodies[name]
-            at = body.find(places(joint.nodes))
-            yield name, (body.dim * at[:, None] + np.arange(body.dim)).ravel()
 
 
 def out_of_balance(dam: Dam, joints: Sequence[JointForces], fit: Fit) -> float:
     """Return the norm of the nodal forces in the joints that move the bodies by what is left of the
     jumps, over the norm of those that close the joints, as the residual is defined.
     """
-    sides, count = list(dofs_of_sides(dam, joints)), len(fit.left)
-    compliance = dam.compliance(sides)
+    compliance, count = dam.compliance, len(fit.left)
     size, rigid = np.abs(compliance).max(), fit.motions
     system = np.block([[compliance / size, rigid], [rigid.T, np.zeros((rigid.shape[1],) * 2)]])
     right = np.zeros((len(system), 2))
@@ -919,7 +928,7 @@ def out_of_balance(dam: Dam, joints: Sequence[JointForces], fit: Fit) -> float:
     forces = np.linalg.lstsq(system, right, rcond=None)[0][:count]
     tractions = [
         joint.tractions(dam.bodies[name])[dofs]
-        for joint, (name, dofs) in zip(joints, sides[::2], strict=True)
+        for joint, (name, dofs) in zip(joints, dam.sides[::2], strict=True)
     ]
     closing = forces[:, 1] - np.concatenate(tractions)
     return float(np.linalg.norm(forces[:, 0]) / np.linalg.norm(closing))

@@ -78,5 +78,5 @@ class Files:
 def without_suffix(table: Table, joint: int) -> Table:
     """A table with the columns of a joint (from 0) without suffix."""
     suffix = f"_{joint + 1}"
-    own = {n: table[n + suffix] for n in table if joint and n + suffix in table}
-    return table | own
+    of_joint = {n: table[n + suffix] for n in table if joint and n + suffix in table}
+    return table | of_joint

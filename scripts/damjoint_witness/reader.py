@@ -84,14 +84,14 @@ def evaluated(expression: str, values: Values, levels: Sequence[float]) -> float
 def resolve(given: Values, levels: Sequence[float]) -> Values:
     """Return the parameters of a joint: those given, defaults, and what follows from others."""
     values = defaults() | given
-    asked = {name for name in given if given[name] != AUTOMATIC}
+    set_values = {name for name in given if given[name] != AUTOMATIC}
     for name, expression in rules():
         if values[name] == AUTOMATIC:
             values[name] = evaluated(expression, values, levels)
     if values["ice_level"] == AUTOMATIC:
         values["ice_level"] = min(max(0.0, *levels), values["dam_height"])
     # area under the softening and the elastic branch of the law rupture: s^2 (1 + P) / (2 K_N)
-    by_length = "pena_rupture" in asked and values["law"] == "rupture"
+    by_length = "pena_rupture" in set_values and values["law"] == "rupture"
     elastic = values["sigma_max"] ** 2 / (2 * values["K_N"])
     if values["G_f"] == AUTOMATIC:
         values["G_f"] = elastic * (1 + values["pena_rupture"]) if by_length and elastic else 100.0
@@ -240,7 +240,7 @@ def sections(joints: Sequence[Values]) -> tuple[Section, ...]:
 
 
 @dataclass(frozen=True)
-class Asked:
+class Request:
     """What a command asks for: parameters of each joint, the lowest first, and the loading."""
 
     command: str
@@ -281,6 +281,24 @@ class Asked:
         return between(self.tail_levels, time)
 
 
+@dataclass(frozen=True)
+class RequestedJoint:
+    """A joint of a request, by its number from 0."""
+
+    request: Request
+    number: int
+
+    @property
+    def values(self) -> Values:
+        """Its parameters."""
+        return self.request.joints[self.number]
+
+    @property
+    def section(self) -> Section:
+        """The section above it."""
+        return self.request.sections[self.number]
+
+
 def between(levels: Sequence[float], time: float) -> float:
     """Return the level at a time: linear from 0 at t = 0 over the levels at t = 1, 2, ..."""
     points, time = (0.0, *levels), min(max(time, 0.0), len(levels))
@@ -288,7 +306,7 @@ def between(levels: Sequence[float], time: float) -> float:
     return points[k] + (time - k) * (points[k + 1] - points[k])
 
 
-def read(words: Sequence[str]) -> Asked:
+def read(words: Sequence[str]) -> Request:
     """Read the words of a command after `damjoint`: `run dam --set name=value ...`.
 
     Raises ValueError for a word that is not understood.
@@ -316,16 +334,16 @@ def read(words: Sequence[str]) -> Asked:
             lists[name] = parts
         else:
             given[name] = parts[0]
-    return asked(command, replace(file, blocks=blocks), given, lists, options)
+    return request(command, replace(file, blocks=blocks), given, lists, options)
 
 
-def asked(
+def request(
     command: str,
     file: CaseFile,
     given: Values,
     lists: dict[str, tuple[Any, ...]],
     options: dict[str, str],
-) -> Asked:
+) -> Request:
     """Return what values, lists and options ask for together."""
     own_times = lists.pop("times", ())
     if {"levels", "steps"} & options.keys():
@@ -358,9 +376,9 @@ def asked(
         for k in range(count)
     ]
     resolved = [resolve(joint, levels) for joint in joints]
-    for joint, own in zip(resolved, joints, strict=True):
+    for joint, given_values in zip(resolved, joints, strict=True):
         joint["downstream_face"] = face
-        joint["hardening_requested"] = float(own.get("pena_tang", AUTOMATIC) != AUTOMATIC)
+        joint["hardening_requested"] = float(given_values.get("pena_tang", AUTOMATIC) != AUTOMATIC)
         if lifts:  # the sizes of the mesh are those of the first joint
             joint |= {name: resolved[0][name] for name in ("h_dam", "h_found")}
     if lifts:
@@ -372,7 +390,7 @@ def asked(
     times = set(own_times) or times
     if resolved[0]["drive"] != "level":
         times |= {resolved[0]["drive_begin"], resolved[0]["drive_end"]} - {0.0}
-    return Asked(
+    return Request(
         *(command, file.path.stem, tuple(resolved), levels, tails, tuple(sorted(times)), geometry),
         Path(record) if record else None,
         options,
@@ -384,18 +402,18 @@ def first_share(joints: Sequence[Values], length: float) -> float:
     return float(joints[0]["n_joint"] * length / sections(joints[:1])[0].length)
 
 
-def differences(asked: Asked, record: dict[str, Any]) -> Iterator[str]:
+def differences(request: Request, record: dict[str, Any]) -> Iterator[str]:
     """Compare what a command asks for with what its run.json has, in words."""
-    for name, own in (("levels", asked.levels), ("tail_levels", asked.tail_levels)):
-        if tuple(record[name]) != own:
-            yield f"run.json: {name} {record[name]}, by the command {own}"
-    if not same_numbers(record["times"], asked.times):
-        yield f"run.json: times {record['times']}, by the command {asked.times}"
+    for name, expected in (("levels", request.levels), ("tail_levels", request.tail_levels)):
+        if tuple(record[name]) != expected:
+            yield f"run.json: {name} {record[name]}, by the command {expected}"
+    if not same_numbers(record["times"], request.times):
+        yield f"run.json: times {record['times']}, by the command {request.times}"
     written = [joint["values"] for joint in record["joints"]] or [{}]
-    if len(written) != len(asked.joints):
-        yield f"run.json: {len(written)} joints, by the command {len(asked.joints)}"
+    if len(written) != len(request.joints):
+        yield f"run.json: {len(written)} joints, by the command {len(request.joints)}"
         return
-    for k, (joint, values) in enumerate(zip(asked.joints, written, strict=True)):
+    for k, (joint, values) in enumerate(zip(request.joints, written, strict=True)):
         claimed = record["parameters"] | values
         for name, value in claimed.items():
             if not same(value, joint[name]):

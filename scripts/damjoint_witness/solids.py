@@ -36,7 +36,7 @@ FROM_VTK_WEDGE = [0, 2, 1, 3, 5, 4]
 #: Regions of the lower body (rock, concrete below a lift joint), and distance of the numbers of
 #: the regions of two joints.
 ROCK, LOWER, LAYER = 2, 11, 1000
-#: Distance within which places are the same, over the size of the body.
+#: Distance within which points are the same, over the size of the body.
 SAME = 1e-8
 
 
@@ -44,7 +44,7 @@ SAME = 1e-8
 # --------------------------------------------------------------------------------------------------
 
 #: Reference coordinates of corners and, of order 2, of the middles of edges and of a quadrangle.
-PLACES: dict[str, list[tuple[float, ...]]] = {
+REFERENCE_POINTS: dict[str, list[tuple[float, ...]]] = {
     "line": [(-1,), (1,), (0,)],
     "triangle": [(0, 0), (1, 0), (0, 1), (0.5, 0), (0.5, 0.5), (0, 0.5)],
     "quad": [(-1, -1), (1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (0, 1), (-1, 0), (0, 0)],
@@ -53,9 +53,10 @@ CORNERS = {"line": 2, "triangle": 3, "quad": 4}
 
 
 @cache
-def places_of(shape: str, order: int) -> Array:
+def reference_points(shape: str, order: int) -> Array:
     """Reference coordinates of the functions of a side (n, d)."""
-    return np.array(PLACES[shape] if order == 2 else PLACES[shape][: CORNERS[shape]], float)
+    number = CORNERS[shape] if order == 1 else None
+    return np.array(REFERENCE_POINTS[shape][:number], float)
 
 
 def monomials(shape: str, order: int, u: Array) -> Array:
@@ -70,7 +71,7 @@ def monomials(shape: str, order: int, u: Array) -> Array:
 
 @cache
 def _coefficients(shape: str, order: int) -> Array:
-    return np.asarray(np.linalg.inv(monomials(shape, order, places_of(shape, order))), float)
+    return np.asarray(np.linalg.inv(monomials(shape, order, reference_points(shape, order))), float)
 
 
 def functions(shape: str, order: int, u: Array) -> Array:
@@ -118,9 +119,9 @@ class Sides:
     order: int
 
     @cached_property
-    def places(self) -> Array:
+    def coordinates(self) -> Array:
         """Places of the functions (m, n, 3)."""
-        at = functions(self.shape, 1, places_of(self.shape, self.order))
+        at = functions(self.shape, 1, reference_points(self.shape, self.order))
         return np.asarray(np.einsum("nc,mcx->mnx", at, self.corners))
 
     @cached_property
@@ -156,7 +157,7 @@ class Sides:
     def at(self, positions: Array, weights: Array) -> Points:
         """Points at positions (q, 3) with weights (q,), each in the side that it lies in."""
         inverse = np.linalg.pinv(self.slopes)  # (m, 3, d)
-        origin = places_of(self.shape, 1)[0]
+        origin = reference_points(self.shape, 1)[0]
         sides, u = np.empty(len(positions), int), np.empty((len(positions), len(origin)))
         tree = cKDTree(self.corners.mean(axis=1))
         reach = np.linalg.norm(self.corners - self.corners.mean(axis=1)[:, None], axis=2).max()
@@ -246,7 +247,7 @@ def read_solids(folder: Path) -> dict[str, Solid]:
         ends = np.cumsum([t.size for _, t, _ in cells])[:-1]
         tables = zip(cells, np.split(numbers.ravel(), ends), strict=True)
         solids[body_name(cells[0][2])] = Solid(
-            mesh.points[used], tuple((s, own.reshape(t.shape), r) for (s, t, r), own in tables)
+            mesh.points[used], tuple((s, new.reshape(t.shape), r) for (s, t, r), new in tables)
         )
     return solids
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .files import Files
-from .reader import Asked, Point, Section, Values
+from .reader import Point, Request, Section, Values
 
 #: Tolerance of forces and moments over the dam's weight (times the joint's length) [-].
 TOLERANCE = 1e-7
@@ -93,9 +93,9 @@ def loads(section: Section, v: Values, time: float, level: float, tail: float) -
     """All loads at a time on the concrete above a joint, but the water in the joint."""
     total, unit = Resultant(section.toe), v["rho_water"] * v["g"]
     _, center = centroid(section.outline)
-    own = weight(section, v)
+    size = weight(section, v)
     quake = ramp(time, v["quake_t"])
-    total.add(quake * v["k_h"] * own, -own + quake * v["k_v"] * own, center)
+    total.add(quake * v["k_h"] * size, -size + quake * v["k_v"] * size, center)
     for face, surface, side in ((section.upstream, level, 1), (section.downstream, tail, -1)):
         uniform = v["face_load"] == "uniform"
         water = of_water(unit, surface, uniform)
@@ -112,8 +112,8 @@ def loads(section: Section, v: Values, time: float, level: float, tail: float) -
     total.add_face(section.upstream, of_silt, v["silt_height"])
     if quake and v["k_h"] and v["added_mass"]:
         add_quake_water(total, section, v, level, quake * v["k_h"] * unit)
-    for fx, fy, place in line_forces(section, v, time):
-        total.add(fx, fy, place)
+    for fx, fy, point in line_forces(section, v, time):
+        total.add(fx, fy, point)
     return total
 
 
@@ -153,16 +153,16 @@ def add_quake_water(
 
 
 def line_forces(section: Section, v: Values, time: float) -> Iterator[tuple[float, float, Point]]:
-    """Ice, line force and anchor that act above the joint: force and place."""
+    """Ice, line force and anchor that act above the joint: force and point."""
     angle, (crest_x, crest_y) = math.radians(v["anchor_angle"]), section.crest[1]
-    if v["ice_force"] and (place := point_on(section.upstream, v["ice_level"])):
-        yield ramp(time, v["ice_t"]) * v["ice_force"], 0.0, place
+    if v["ice_force"] and (point := point_on(section.upstream, v["ice_level"])):
+        yield ramp(time, v["ice_t"]) * v["ice_force"], 0.0, point
     if v["force_x"] or v["force_y"]:
         face = {"upstream": section.upstream, "downstream": section.downstream}.get(v["force_face"])
-        place = point_on(face, v["force_at"]) if face else (crest_x + v["force_at"], crest_y)
+        point = point_on(face, v["force_at"]) if face else (crest_x + v["force_at"], crest_y)
         grown = ramp(time, v["force_t"])
-        if place:
-            yield grown * v["force_x"], grown * v["force_y"], place
+        if point:
+            yield grown * v["force_x"], grown * v["force_y"], point
     if v["anchor_force"]:
         grown = ramp(time, v["anchor_t"]) * v["anchor_force"]
         along = -grown * math.sin(angle), -grown * math.cos(angle)
@@ -184,14 +184,14 @@ def along_joint(section: Section, total: Resultant) -> tuple[float, float, float
     return ty * total.x - tx * total.y, tx * total.x + ty * total.y, total.moment
 
 
-def balance(files: Files, asked: Asked) -> Iterator[str]:
+def balance(files: Files, request: Request) -> Iterator[str]:
     """Check N + U, T and M + M_U of every joint in every row of history.csv."""
-    for k, (section, values) in enumerate(zip(asked.sections, asked.joints, strict=True)):
+    for k, (section, values) in enumerate(zip(request.sections, request.joints, strict=True)):
         rows = files.history_of(k)
-        size = weight(asked.sections[0], asked.joints[0])
+        size = weight(request.sections[0], request.joints[0])
         worst: dict[str, tuple[float, str]] = {}
         for n, (time, level) in enumerate(zip(rows["time"], rows["level"], strict=True)):
-            exact = along_joint(section, loads(section, values, time, level, asked.tail_at(time)))
+            exact = along_joint(section, loads(section, values, time, level, request.tail_at(time)))
             found = {
                 "N + U": rows["N"][n] + rows["U"][n],
                 "T": rows["T"][n],

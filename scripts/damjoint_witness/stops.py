@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from .files import Files, Table, rows_where
-from .reader import Asked, Section, Values
+from .reader import Request, RequestedJoint, Values
 from .statics import along_joint, loads
 
 #: Least safety of a rigid block whose equilibrium counts as certain [-].
@@ -47,24 +47,12 @@ class Forces:
 
 
 @dataclass(frozen=True)
-class Joint:
+class Joint(RequestedJoint):
     """A joint of a run that has stopped."""
 
     files: Files
-    asked: Asked
-    number: int
     #: rows of steps.csv of the joint's integration points after the last step
     points: Table
-
-    @property
-    def values(self) -> Values:
-        """Its parameters."""
-        return self.asked.joints[self.number]
-
-    @property
-    def section(self) -> Section:
-        """The section above it."""
-        return self.asked.sections[self.number]
 
     @property
     def last(self) -> dict[str, float]:
@@ -76,9 +64,9 @@ class Joint:
         """Forces at the smallest step beyond the last state: under the uplift of that state, or the
         most that can be, the highest head along the whole joint.
         """
-        v, last, asked = self.values, self.last, self.asked
-        time = min(last["time"] + v["smallest_step"], asked.times[-1])
-        level, tail = asked.level_at(time), asked.tail_at(time)
+        v, last, request = self.values, self.last, self.request
+        time = min(last["time"] + v["smallest_step"], request.times[-1])
+        level, tail = request.level_at(time), request.tail_at(time)
         total, T, moment = along_joint(self.section, loads(self.section, v, time, level, tail))
         U, M_U, length = last["U"], last["M_U"], self.section.length
         if most_uplift and v["uplift"] != "none":
@@ -178,7 +166,7 @@ def equilibrium_is_certain(joint: Joint) -> bool:
     return bool(inside and holds and not (v["grout_pressure"] or v["time_unit"]))
 
 
-def judge(files: Files, asked: Asked, steps: Table) -> tuple[bool, str]:
+def judge(files: Files, request: Request, steps: Table) -> tuple[bool, str]:
     """Judge a run that has stopped: whether it is wrong that it has, and a remark.
 
     A remark without an error: the stop is undecided.
@@ -186,10 +174,10 @@ def judge(files: Files, asked: Asked, steps: Table) -> tuple[bool, str]:
     verdict = str(files.record["verdict"])
     if files.record["state"] != "stopped":
         return True, str(files.record["statement"])
-    if not asked.sections:
+    if not request.sections:
         return False, f"{verdict}, joints that meet: not judged"
-    joints = failing(files, asked, steps, verdict)
-    by_level = asked.joints[0]["drive"] == "level"
+    joints = failing(files, request, steps, verdict)
+    by_level = request.joints[0]["drive"] == "level"
     if not by_level:
         return False, f"{verdict}, displacement control: the level beyond is not known"
     if all(map(equilibrium_is_certain, joints)):
@@ -201,7 +189,7 @@ def judge(files: Files, asked: Asked, steps: Table) -> tuple[bool, str]:
     return False, f"{verdict}, below the limit analysis by a factor of {least:.4g}"
 
 
-def failing(files: Files, asked: Asked, steps: Table, verdict: str) -> Sequence[Joint]:
+def failing(files: Files, request: Request, steps: Table, verdict: str) -> Sequence[Joint]:
     """The joints that a verdict names, or all."""
     _, _, named = verdict.partition(" on ")
     names = [joint["name"] for joint in files.record["joints"]] or [""]
@@ -210,5 +198,5 @@ def failing(files: Files, asked: Asked, steps: Table, verdict: str) -> Sequence[
     for k, name in enumerate(names):
         if not named or name in named.split(" and "):
             rows = rows_where(steps, end & (steps["joint"] == k + 1) & (steps["weight"] > 0))
-            found.append(Joint(files, asked, k, rows))
+            found.append(Joint(request, k, files, rows))
     return found

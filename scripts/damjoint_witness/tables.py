@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from .files import Files, Table, rows_where, split_by
-from .reader import Asked, differences
+from .reader import Request, differences
 
 #: Relative tolerance of written values: 12 digits, and stresses are differences of larger ones.
 DIGITS = 1e-7
@@ -22,19 +22,19 @@ COLUMNS = (
 )
 
 
-def bookkeeping(files: Files, asked: Asked) -> Iterator[str]:
+def bookkeeping(files: Files, request: Request) -> Iterator[str]:
     """Check parameters, order of rows, levels, completeness of tables and the exit code."""
-    yield from differences(asked, files.record)
-    history, first = files.history, asked.joints[0]
+    yield from differences(request, files.record)
+    history, first = files.history, request.joints[0]
     if not all(np.isfinite(v).all() for name, v in history.items() if "x_resultant" not in name):
         yield "history.csv: a value is not finite"
     if (np.diff(history["time"]) <= 0).any():
         yield "history.csv: times do not increase"
     written = [float(table["time"][0]) for table in files.joint_tables]
-    if not files.stopped and written != list(asked.requested):
-        yield f"joint.csv: tables at t = {written}, requested {asked.requested}"
+    if not files.stopped and written != list(request.requested):
+        yield f"joint.csv: tables at t = {written}, requested {request.requested}"
     room = DIGITS * first["dam_height"]
-    for name, prescribed in (("level", asked.level_at), ("tail_level", asked.tail_at)):
+    for name, prescribed in (("level", request.level_at), ("tail_level", request.tail_at)):
         if name == "level" and first["drive"] != "level":
             continue
         off = np.abs(history[name] - [prescribed(t) for t in history["time"]])
@@ -46,7 +46,7 @@ def bookkeeping(files: Files, asked: Asked) -> Iterator[str]:
     names = [joint["name"] for joint in files.record["joints"]] or [""]
     failing = [
         v
-        for v, name in zip(asked.joints, names, strict=True)
+        for v, name in zip(request.joints, names, strict=True)
         if not named or name in named.split(" and ")
     ]
     hardens = all(v["law"] == "friction" and v["hardening_requested"] for v in failing)
@@ -73,11 +73,11 @@ def updates_of(steps: Table, joint: int, nodes: bool) -> list[Table]:
     )
 
 
-def integrals(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
+def integrals(files: Files, request: Request, steps: Table) -> Iterator[str]:
     """Check that N, T and M of history.csv are the integrals of the written tractions over the
     integration points.
     """
-    for k, section in enumerate(asked.sections):
+    for k, section in enumerate(request.sections):
         updates, rows = updates_of(steps, k, nodes=False), files.history_of(k)
         along = math.cos(section.slope), math.sin(section.slope)
         for n, (time, level) in enumerate(zip(rows["time"], rows["level"], strict=True)):
@@ -95,9 +95,9 @@ def integrals(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
                     return
 
 
-def nodes(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
+def nodes(files: Files, request: Request, steps: Table) -> Iterator[str]:
     """Check that the rows of joint.csv are those of the nodes in steps.csv."""
-    for k in range(len(asked.joints)):
+    for k in range(len(request.joints)):
         updates = updates_of(steps, k, nodes=True)
         for table in files.tables_of(k):
             time, level = float(table["time"][0]), float(table["level"][0])

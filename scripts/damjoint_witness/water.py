@@ -22,7 +22,7 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from .files import Files, Table, rows_where
-from .reader import Asked, Values
+from .reader import Request, RequestedJoint, Values
 from .solids import SHAPES, Array, IntArray, Sides, corners_of, functions, rule
 
 #: Error of a pressure over the largest one, and of a flux over its scale: they are written with 12
@@ -31,7 +31,7 @@ DIGITS, IN_3D = 1e-9, 1e-6
 #: Last digits of the heads by which a flux may differ: those of two solutions.
 HEAD_DIGITS = 10
 #: Places of nodes have 9 decimals [m].
-SAME_PLACE = 1e-7
+SAME_POINT = 1e-7
 #: Part of their effect below which drains have none [-]: rounding.
 NO_EFFECT = 1e-9
 #: Times that differ by less are the same.
@@ -57,21 +57,14 @@ FLOWING, CLOSED = ("flow", "cracked"), ("none", "waterstop")
 
 
 @dataclass(frozen=True)
-class JointState:
+class JointState(RequestedJoint):
     """A joint at a time: rows of its nodes, its elements, and the openings."""
 
-    asked: Asked
-    number: int
     rows: Table
     sides: tuple[Sides, ...]
     tail: float
     #: rows of its integration points when the step began; none: undamaged
     before: Table
-
-    @property
-    def values(self) -> Values:
-        """Parameters of the joint."""
-        return self.asked.joints[self.number]
 
     @property
     def level(self) -> float:
@@ -81,7 +74,7 @@ class JointState:
     @cached_property
     def positions(self) -> Array:
         """Positions of the rows (n, 3)."""
-        return places(self.rows)
+        return coordinates(self.rows)
 
     @cached_property
     def ends(self) -> tuple[Array, Array]:
@@ -109,10 +102,10 @@ class JointState:
         """Weight of water [N/m3]."""
         return float(self.values["rho_water"] * self.values["g"])
 
-    def find(self, places: Array) -> IntArray:
-        """Return the rows at places (..., 3)."""
-        distance, found = map(np.asarray, cKDTree(self.positions).query(places))
-        if distance.max(initial=0) > SAME_PLACE:
+    def find(self, coordinates: Array) -> IntArray:
+        """Return the rows at points (..., 3)."""
+        distance, found = map(np.asarray, cKDTree(self.positions).query(coordinates))
+        if distance.max(initial=0) > SAME_POINT:
             raise ValueError("joint.csv: a node of the joint's elements has no row")
         return np.asarray(found, int)
 
@@ -124,7 +117,7 @@ class JointState:
         for sides in self.sides:
             u, _ = joint_rule(sides.shape, sides.order, self.values["quadrature"])
             at = functions(sides.shape, sides.order, u)
-            jump = self.rows["delta_n"][self.find(sides.places)] @ at.T
+            jump = self.rows["delta_n"][self.find(sides.coordinates)] @ at.T
             opening = np.maximum(jump, 0)
             if self.values["uplift"] == "flow":
                 wider = np.maximum(jump + self.values["aperture_elastic"], 0)
@@ -185,12 +178,12 @@ def joint_rule(shape: str, order: int, quadrature: str) -> tuple[Array, Array]:
     return np.array([(a, b) for a in x for b in x]), np.outer(w, w).ravel()
 
 
-def sides_of(files: Files, asked: Asked, number: int, rows: Table) -> tuple[Sides, ...]:
+def sides_of(files: Files, request: Request, number: int, rows: Table) -> tuple[Sides, ...]:
     """Return the elements of a joint: in 2D between its nodes along it, in 3D those of the file
     fields/joint_t*.vtu, joint_2_t*.vtu, ...
     """
-    order = int(asked.joints[0]["order"])
-    if asked.joints[0]["dim"] == 2:
+    order = int(request.joints[0]["order"])
+    if request.joints[0]["dim"] == 2:
         by_s = np.argsort(rows["s"])[::order]
         corners = np.column_stack([rows[name][by_s] for name in "xyz"])
         return (Sides("line", np.stack([corners[:-1], corners[1:]], axis=1), order),)
@@ -222,7 +215,7 @@ def heads_at_ends(
 
 
 def line_over_drains(joint: JointState) -> tuple[list[float], list[float]]:
-    """Return places [m from the heel] and heads [m] of uplift = imposed or drained."""
+    """Return positions [m from the heel] and heads [m] of uplift = imposed or drained."""
     values, length = joint.values, joint.length
     heel, toe = (float(end[1]) for end in joint.ends)
     first, last = heads_at_ends(heel, toe, joint.level, joint.tail, flowing=False)
@@ -248,7 +241,7 @@ def pressure(joint: JointState, heads: Heads, least: float = 0.0) -> Callable[[A
         if values["uplift"] != "waterstop":
             return np.asarray(full)
         stop = values["waterstop"]
-        return np.asarray(full * (joint.distance(positions) <= stop + SAME_PLACE) * (stop > 0))
+        return np.asarray(full * (joint.distance(positions) <= stop + SAME_POINT) * (stop > 0))
 
     return at
 
@@ -286,7 +279,7 @@ class Flow:
             (self.drops, other.drops),
             (self.inflow, other.inflow),
         )
-        return Flow(*((1 - share) * own + share * its for own, its in pairs))
+        return Flow(*((1 - share) * a + share * b for a, b in pairs))
 
     def plus(self, share: float, one: Flow, other: Flow) -> Flow:
         """Return the sum with a share of the difference of two solutions."""
@@ -318,21 +311,22 @@ class Graph:
             eliminated = []
             free = [node for node in range(self.number) if node not in fixed and links[node]]
             for node in sorted(free, key=lambda n: len(links[n])):
-                own = links[node]
-                whole = sum(own.values(), Decimal(0))
-                for a, size in own.items():
+                linked = links[node]
+                whole = sum(linked.values(), Decimal(0))
+                for a, size in linked.items():
                     del links[a][node]
-                    for b, other in own.items():
+                    for b, other in linked.items():
                         if a != b:
                             links[a][b] = links[a].get(b, Decimal(0)) + size * other / whole
-                eliminated.append((node, own, whole))
+                eliminated.append((node, linked, whole))
             heads = {node: Decimal(head) for node, head in fixed.items()}
             inflow = np.zeros(self.number)
             for node in fixed:
                 parts = [size * (heads[node] - heads[b]) for b, size in links[node].items()]
                 inflow[node] = float(sum(parts, Decimal(0)))
-            for node, own, whole in reversed(eliminated):
-                heads[node] = sum((size * heads[b] for b, size in own.items()), Decimal(0)) / whole
+            for node, linked, whole in reversed(eliminated):
+                flows = (size * heads[b] for b, size in linked.items())
+                heads[node] = sum(flows, Decimal(0)) / whole
             drops = [float(heads[i] - heads[k]) for i, k in self.pairs.tolist()]
         return Flow(
             np.array([float(heads[n]) for n in range(self.number)]), np.array(drops), inflow
@@ -397,10 +391,10 @@ class Network:
     @cached_property
     def _numbering(self) -> tuple[Array, list[list[IntArray]]]:
         corners = [sides.corners for joint in self.joints for sides in joint.sides]
-        places, number = distinct_places(np.concatenate([c.reshape(-1, 3) for c in corners]))
+        coordinates, number = distinct_points(np.concatenate([c.reshape(-1, 3) for c in corners]))
         parts = np.split(number, np.cumsum([c.size // 3 for c in corners])[:-1])
         tables = iter([part.reshape(c.shape[:2]) for part, c in zip(parts, corners, strict=True)])
-        return places, [[next(tables) for _ in joint.sides] for joint in self.joints]
+        return coordinates, [[next(tables) for _ in joint.sides] for joint in self.joints]
 
     @property
     def nodes(self) -> Array:
@@ -441,9 +435,9 @@ class Network:
                 cube = np.ones_like(factor) if uniform else (narrowest * cube) ** 3
                 number = len(table) if plane else factor.size
                 if drops is not None and joint.values["uplift"] == "flow":
-                    own = drops[first : first + number]
+                    of_side = drops[first : first + number]
                     lengths = 2 * sides.measures[:, None]
-                    slopes = own[:, None] / lengths if plane else steepness(own, factor)
+                    slopes = of_side[:, None] / lengths if plane else steepness(of_side, factor)
                     cube = cube * joint.slowed(cube, slopes)
                 first += number
                 yield sides, table, cube * np.outer(sides.measures, w)
@@ -511,10 +505,10 @@ class Network:
         for which in (0, 1):
             nodes: list[int] = []
             for k, joint in enumerate(self.joints):
-                own = self.nodes_of(k)
-                s = joint.rows["s"][joint.find(self.nodes[own])]
-                at_end = own[np.abs(s - (s.max() if which else s.min())) < SAME_PLACE]
-                near = tree.query_ball_point(self.nodes[at_end], SAME_PLACE)
+                numbers = self.nodes_of(k)
+                s = joint.rows["s"][joint.find(self.nodes[numbers])]
+                at_end = numbers[np.abs(s - (s.max() if which else s.min())) < SAME_POINT]
+                near = tree.query_ball_point(self.nodes[at_end], SAME_POINT)
                 nodes += [n for n, others in zip(at_end, near, strict=True) if len(others) == 1]
             ends.append(np.unique(np.array(nodes, int)))
         return ends[0], ends[1]
@@ -549,9 +543,9 @@ class Network:
         """Nodes at heel or toe of a joint that end at a joint that water does not pass."""
         inner = list[IntArray]()
         for k, joint in enumerate(self.joints):
-            own = self.nodes_of(k)
-            s = joint.rows["s"][joint.find(self.nodes[own])]
-            inner.append(own[(s - s.min() < SAME_PLACE) | (s.max() - s < SAME_PLACE)])
+            numbers = self.nodes_of(k)
+            s = joint.rows["s"][joint.find(self.nodes[numbers])]
+            inner.append(numbers[(s - s.min() < SAME_POINT) | (s.max() - s < SAME_POINT)])
         of_joints = np.concatenate([self.nodes_of(k) for k in range(len(self.joints))])
         alone = np.bincount(of_joints, minlength=len(self.nodes)) == 1
         found = np.unique(np.concatenate(inner))
@@ -616,26 +610,26 @@ class Network:
             values = joint.values
             if values["uplift"] not in FLOWING or not values["drains"]:
                 continue
-            own = self.nodes_of(k)
-            s = joint.rows["s"][joint.find(self.nodes[own])]
-            inner = (s > s.min() + SAME_PLACE) & (s < s.max() - SAME_PLACE)
-            own, s = own[inner], s[inner]
+            numbers = self.nodes_of(k)
+            s = joint.rows["s"][joint.find(self.nodes[numbers])]
+            inner = (s > s.min() + SAME_POINT) & (s < s.max() - SAME_POINT)
+            numbers, s = numbers[inner], s[inner]
             away = np.abs(s - values["drain_x"])
-            here = away < away.min() + SAME_PLACE
+            here = away < away.min() + SAME_POINT
             outlets = {
                 n: float(max(self.nodes[n, 1], values["drain_level"], joint.tail))
-                for n in own[here].tolist()
+                for n in numbers[here].tolist()
             }
             remaining = 1.0
             if values["uplift"] == "cracked":
-                remaining -= self.cracked_beside(k, own[here], float(s[here].mean()))
+                remaining -= self.cracked_beside(k, numbers[here], float(s[here].mean()))
             if remaining > NO_EFFECT:
                 lines.append(DrainLine(k, outlets, remaining))
         return lines
 
-    def cracked_beside(self, joint: int, nodes: IntArray, place: float) -> float:
-        """Return the cracked part of the elements before drains at a place [m from the heel], plus
-        that of those behind them.
+    def cracked_beside(self, joint: int, nodes: IntArray, distance: float) -> float:
+        """Return the cracked part of the elements before drains at a distance from the heel [m],
+        plus that of those behind them.
         """
         state, parts = self.joints[joint], {-1: [0.0, 0.0], 1: [0.0, 0.0]}
         for sides, table, factor in zip(
@@ -646,7 +640,7 @@ class Network:
             middles = state.distance(sides.corners.mean(axis=1))
             sizes = np.outer(sides.measures, w)
             for side, part in parts.items():
-                beside = touching & (side * (middles - place) > SAME_PLACE)
+                beside = touching & (side * (middles - distance) > SAME_POINT)
                 part[0] += float((sizes * (factor - 1) / CRACK_MOST)[beside].sum())
                 part[1] += float(sizes[beside].sum())
         return sum(cracked / whole for cracked, whole in parts.values() if whole)
@@ -729,15 +723,15 @@ class Network:
                 cube = cube * state.slowed(cube, np.linalg.norm(slopes, axis=2))
             along = slopes[..., :2] @ state.along
             means = -share * (cube * along) @ w / w.sum()
-            own = self.nodes_of(joint)
-            along_joint = state.rows["s"][state.find(self.nodes[own])]
-            toe = own[along_joint.max() - along_joint < SAME_PLACE]
+            numbers = self.nodes_of(joint)
+            along_joint = state.rows["s"][state.find(self.nodes[numbers])]
+            toe = numbers[along_joint.max() - along_joint < SAME_POINT]
             at_toe = np.isin(np.arange(len(self.nodes)), toe).astype(float)[table]
             tested = np.einsum("mqax,ma->mqx", of_functions, at_toe)
             products = np.einsum("mqx,mqx->mq", slopes, tested) * cube
             leakage = float(-share * np.sum(products @ w * sides.measures))
             leakage /= float(np.ptp(self.nodes[:, 2]))
-        rows = state.find(sides.places)
+        rows = state.find(sides.coordinates)
         total, count = np.zeros(len(state.positions)), np.zeros(len(state.positions))
         np.add.at(total, rows, means[:, None])
         np.add.at(count, rows, 1)
@@ -756,13 +750,13 @@ class Network:
 ENTERS = 1e-12
 
 
-def distinct_places(places: Array) -> tuple[Array, IntArray]:
-    """Return places (n, 3), each once, and the number of each of those given (m,)."""
-    pairs = cKDTree(places).query_pairs(SAME_PLACE, output_type="ndarray")
-    links = sparse.coo_matrix((np.ones(len(pairs)), pairs.T), (len(places),) * 2)
+def distinct_points(coordinates: Array) -> tuple[Array, IntArray]:
+    """Return points (n, 3), each once, and the number of each of those given (m,)."""
+    pairs = cKDTree(coordinates).query_pairs(SAME_POINT, output_type="ndarray")
+    links = sparse.coo_matrix((np.ones(len(pairs)), pairs.T), (len(coordinates),) * 2)
     _, number = connected_components(links, directed=False)
     _, first = np.unique(number, return_index=True)
-    return places[first], np.asarray(number, int)
+    return coordinates[first], np.asarray(number, int)
 
 
 def steepness(gradients: Array, like: Array) -> Array:
@@ -799,7 +793,7 @@ def networks(joints: Sequence[JointState]) -> list[Network]:
             group
             for group in groups
             if any(
-                np.isfinite(tree.query(joints[i].positions, 1, 0, 2, SAME_PLACE)[0]).any()
+                np.isfinite(tree.query(joints[i].positions, 1, 0, 2, SAME_POINT)[0]).any()
                 for i in group
             )
         ]
@@ -813,7 +807,7 @@ def heads_of(joints: Sequence[JointState]) -> list[Heads]:
     found: dict[int, Heads] = {}
     for network in networks(joints):
         alone = network.first.values["uplift"] in ("imposed", "drained")
-        if len(network.joints) == 1 and alone and not joints[0].asked.geometry:
+        if len(network.joints) == 1 and alone and not joints[0].request.geometry:
             found[network.first.number] = line(network.first)
             continue
         for k, joint in enumerate(network.joints):
@@ -828,28 +822,30 @@ def at_level(level: float) -> Heads:
 
 def line(joint: JointState) -> Heads:
     """Return the head of a joint of uniform transmissivity, with drains or without."""
-    places, heads = line_over_drains(joint)
-    return lambda positions: np.interp(joint.distance(positions), places, heads)
+    coordinates, heads = line_over_drains(joint)
+    return lambda positions: np.interp(joint.distance(positions), coordinates, heads)
 
 
-def states(files: Files, asked: Asked, steps: Table) -> Iterator[tuple[float, list[JointState]]]:
+def states(
+    files: Files, request: Request, steps: Table
+) -> Iterator[tuple[float, list[JointState]]]:
     """Yield at each requested time the number of its update and the joints."""
     for table in files.joint_tables:
         still = rows_where(steps, steps["earthquake"] == 0)
         update = update_at(still, table["time"][0], table["level"][0])
         tail = float(steps["tail_level"][steps["update"] == update][0])
         joints = []
-        for k in range(len(asked.joints)):
-            opened, softened = water_follows(asked.joints[k], steps, update)
+        for k in range(len(request.joints)):
+            opened, softened = water_follows(request.joints[k], steps, update)
             now, then = (
                 rows_where(steps, (steps["update"] == number) & (steps["joint"] == k + 1))
                 for number in (update, opened)
             )
             rows = with_all_digits(rows_where(table, table["joint"] == k + 1), now, then)
-            sides = sides_of(files, asked, k, rows)
+            sides = sides_of(files, request, k, rows)
             before = rows_where(steps, (steps["update"] == softened) & (steps["joint"] == k + 1))
             before = rows_where(before, before["weight"] > 0)
-            joints.append(JointState(asked, k, rows, sides, tail, before))
+            joints.append(JointState(request, k, rows, sides, tail, before))
         yield update, joints
 
 
@@ -872,13 +868,13 @@ def with_all_digits(rows: Table, now: Table, opened: Table) -> Table:
     that the water follows; none: closed.
     """
     nodes, then = (rows_where(table, table["weight"] == 0) for table in (now, opened))
-    found = np.asarray(cKDTree(places(nodes)).query(places(rows))[1])
+    found = np.asarray(cKDTree(coordinates(nodes)).query(coordinates(rows))[1])
     exact = rows | {name: nodes[name][found] for name in "xyz"}
     openings = then["delta_n"][found] if len(then["delta_n"]) else np.zeros(len(found))
     return exact | {"delta_n": openings}
 
 
-def places(table: Table) -> Array:
+def coordinates(table: Table) -> Array:
     """Return the positions (n, 3) of rows."""
     return np.column_stack([table[name] for name in "xyz"])
 
@@ -892,28 +888,30 @@ def update_at(steps: Table, time: float, level: float) -> float:
     return float(steps["update"][exact if exact.any() else by_level].max())
 
 
-def violations(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
+def violations(files: Files, request: Request, steps: Table) -> Iterator[str]:
     """Yield where pressure or flux differ from those that follow from the openings, but where water
     is stored, see water_in_time; in 3D of a run with fields, which have the elements of the joints.
     """
-    plane = asked.joints[0]["dim"] == 2
+    plane = request.joints[0]["dim"] == 2
     room = DIGITS if plane else IN_3D
     if not plane and not (files.folder / "fields").is_dir():
         return
-    for _, joints in states(files, asked, steps):
+    for _, joints in states(files, request, steps):
         time = joints[0].rows["time"][0]
         together = networks(joints)
         stored = {
             joint.number
             for network in together
             for joint in network.joints
-            if network.flowing and is_stored(asked, time)
+            if network.flowing and is_stored(request, time)
         }
         for joint, heads in zip(joints, heads_of(joints), strict=True):
             if joint.number in stored:
                 continue
             exact = pressure(joint, heads)(joint.positions)
-            scale = joint.unit_weight * max(joint.level, joint.tail, asked.joints[0]["dam_height"])
+            scale = joint.unit_weight * max(
+                joint.level, joint.tail, request.joints[0]["dam_height"]
+            )
             error = np.abs(joint.rows["p"] - exact).max()
             if error > room * scale:
                 yield f"joint {joint.number + 1}: p off by {error:.3g} Pa at t = {time:g}"
@@ -923,9 +921,9 @@ def violations(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
                     yield from flux(files, network, k, room)
 
 
-def is_stored(asked: Asked, time: float) -> bool:
+def is_stored(request: Request, time: float) -> bool:
     """Whether water flows in time, see water_in_time, in the step to a time of the static loads."""
-    first = asked.joints[0]
+    first = request.joints[0]
     return bool(first["time_unit"] and time > first["time_start"])
 
 

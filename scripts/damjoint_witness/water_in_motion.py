@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from .files import Files, Table, rows_where, split_by
-from .reader import Asked
+from .reader import Request
 from .replay import gaping
 from .solids import Array
 from .water import (
@@ -23,35 +23,35 @@ from .water import (
     FLOWING,
     IN_3D,
     JointState,
+    coordinates,
     heads_of,
-    places,
     pressure,
     states,
     with_all_digits,
 )
 
 
-def violations(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
+def violations(files: Files, request: Request, steps: Table) -> Iterator[str]:
     """Yield of each joint the time step whose pressure is wrong, and by how much the worst one is;
     in 3D of an earthquake with fields, which have the elements of the joints.
     """
-    first = asked.joints[0]
+    first = request.joints[0]
     rule = first["quake_uplift"]
     if rule == "transient" or (first["dim"] == 3 and not (files.folder / "fields").is_dir()):
         return
     at_rest = next(
         joints
-        for _, joints in states(files, asked, steps)
-        if joints[0].rows["time"][0] == asked.times[-1]
+        for _, joints in states(files, request, steps)
+        if joints[0].rows["time"][0] == request.times[-1]
     )
     updates = [
-        split_by(rows_where(steps, steps["joint"] == k + 1), "update") for k in numbers(asked)
+        split_by(rows_where(steps, steps["joint"] == k + 1), "update") for k in numbers(request)
     ]
     moving = [n for n, update in enumerate(updates[0]) if update["earthquake"][0]]
     if not moving:
         return
     static = pressures(at_rest, [of_joint[moving[0] - 1] for of_joint in updates])
-    flows = rule == "crack" and any(joint["uplift"] in FLOWING for joint in asked.joints)
+    flows = rule == "crack" and any(joint["uplift"] in FLOWING for joint in request.joints)
     dry = (
         [without_water(joint, of_joint) for joint, of_joint in zip(at_rest, updates, strict=True)]
         if rule == "zero"
@@ -74,15 +74,15 @@ def violations(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
         yield f"joint {k + 1}: p off by {error:.3g} Pa at t = {time:g} s of the earthquake"
 
 
-def numbers(asked: Asked) -> range:
+def numbers(request: Request) -> range:
     """Return the numbers of the joints, from 0."""
-    return range(len(asked.joints))
+    return range(len(request.joints))
 
 
 def pressures(joints: Sequence[JointState], rows: Sequence[Table]) -> list[Array]:
     """Return the pressure [Pa] at the rows of each joint, nodes and integration points."""
     pairs = zip(joints, heads_of(joints), rows, strict=True)
-    return [pressure(joint, heads)(places(table)) for joint, heads, table in pairs]
+    return [pressure(joint, heads)(coordinates(table)) for joint, heads, table in pairs]
 
 
 def opened(joints: Sequence[JointState], begin: Sequence[Table]) -> list[JointState]:
@@ -102,11 +102,11 @@ def without_water(joint: JointState, updates: Sequence[Table]) -> NDArray[np.boo
     points of the elements all of whose points gape, and the nodes of these elements.
     """
     rows = updates[0]
-    at_points, where = rows["weight"] > 0, places(rows)
+    at_points, where = rows["weight"] > 0, coordinates(rows)
     (sides,) = joint.sides
     points, nodes = np.flatnonzero(at_points), np.flatnonzero(~at_points)
     element = replace(sides, order=1).at(where[points], rows["weight"][points]).sides
-    of_element = nodes[np.asarray(cKDTree(where[nodes]).query(sides.places)[1])]
+    of_element = nodes[np.asarray(cKDTree(where[nodes]).query(sides.coordinates)[1])]
     open_points = gaping([rows_where(u, u["weight"] > 0) for u in updates], joint.values)
     dry = np.zeros((len(updates), len(where)), bool)
     for n, gapes in enumerate(open_points):

@@ -20,7 +20,7 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from .files import Files, Table, rows_where, split_by
-from .reader import Asked
+from .reader import Request
 from .solids import Array, IntArray, functions
 from .water import (
     DIGITS,
@@ -32,10 +32,10 @@ from .water import (
     Heads,
     JointState,
     Network,
+    coordinates,
     is_stored,
     joint_rule,
     networks,
-    places,
     states,
     update_at,
     with_all_digits,
@@ -53,12 +53,12 @@ MASS = 1e-6
 ROUNDING = 1e-12
 
 
-def applies(files: Files, asked: Asked) -> bool:
+def applies(files: Files, request: Request) -> bool:
     """Whether water may be stored in the joints of a run; in 3D one with fields, which have the
     elements of the joints.
     """
-    known = asked.joints[0]["dim"] == 2 or (files.folder / "fields").is_dir()
-    return known and any(joint["uplift"] == "flow" for joint in asked.joints)
+    known = request.joints[0]["dim"] == 2 or (files.folder / "fields").is_dir()
+    return known and any(joint["uplift"] == "flow" for joint in request.joints)
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Stored:
     def mixed(self, share: float, other: Stored) -> Stored:
         """Return the mean with a share of another state."""
         pairs = zip(vars(self).values(), vars(other).values(), strict=True)
-        return Stored(*((1 - share) * own + share * its for own, its in pairs))
+        return Stored(*((1 - share) * a + share * b for a, b in pairs))
 
 
 #: Without drains, and with drains of full effect.
@@ -249,8 +249,8 @@ def solved_by_matrix(
     heads[list(fixed)] = list(fixed.values())
     free = np.setdiff1d(np.arange(number), list(fixed))
     if len(free):
-        own = matrix[np.ix_(free, free)] + np.diag(ground[free])
-        heads[free] = np.linalg.solve(own, source[free] - matrix[free] @ heads)
+        square = matrix[np.ix_(free, free)] + np.diag(ground[free])
+        heads[free] = np.linalg.solve(square, source[free] - matrix[free] @ heads)
     return heads, matrix @ heads, heads[pairs[:, 0]] - heads[pairs[:, 1]]
 
 
@@ -268,27 +268,27 @@ def solved(
         for (i, k), size in zip(pairs.tolist(), conductances.tolist(), strict=True):
             for a, b in ((i, k), (k, i)):
                 links[a][b] = links[a].get(b, Decimal(0)) + Decimal(size)
-        original = [dict(own) for own in links]
+        original = [dict(linked) for linked in links]
         store, right = [[Decimal(float(x)) for x in values] for values in (ground, source)]
         eliminated = []
         for node in sorted(set(range(number)) - set(fixed), key=lambda n: len(links[n])):
-            own = links[node]
-            whole = sum(own.values(), store[node])
-            for a, size in own.items():
+            linked = links[node]
+            whole = sum(linked.values(), store[node])
+            for a, size in linked.items():
                 del links[a][node]
                 store[a] += size * store[node] / whole
                 right[a] += size * right[node] / whole
-                for b, other in own.items():
+                for b, other in linked.items():
                     if a != b:
                         links[a][b] = links[a].get(b, Decimal(0)) + size * other / whole
-            eliminated.append((node, own, whole))
+            eliminated.append((node, linked, whole))
         heads = {node: Decimal(head) for node, head in fixed.items()}
-        for node, own, whole in reversed(eliminated):
-            flow = sum((size * heads[b] for b, size in own.items()), right[node])
+        for node, linked, whole in reversed(eliminated):
+            flow = sum((size * heads[b] for b, size in linked.items()), right[node])
             heads[node] = flow / whole
         out = [
-            float(sum((size * (heads[n] - heads[b]) for b, size in own.items()), Decimal(0)))
-            for n, own in enumerate(original)
+            float(sum((size * (heads[n] - heads[b]) for b, size in linked.items()), Decimal(0)))
+            for n, linked in enumerate(original)
         ]
         drops = [float(heads[i] - heads[k]) for i, k in pairs.tolist()]
     return np.array([float(heads[n]) for n in range(number)]), np.array(out), np.array(drops)
@@ -303,9 +303,9 @@ class Update:
     seconds: float
 
 
-def steps_of(asked: Asked, updates: Sequence[Table]) -> Iterator[Update]:
+def steps_of(request: Request, updates: Sequence[Table]) -> Iterator[Update]:
     """Yield the updates of a joint in which water flows in time."""
-    values = asked.joints[0]
+    values = request.joints[0]
     moving = values["quake_uplift"] == "transient"
     times = [(float(u["begin"][0]), float(u["time"][0])) for u in updates]
     for n, update in enumerate(updates):
@@ -314,7 +314,7 @@ def steps_of(asked: Asked, updates: Sequence[Table]) -> Iterator[Update]:
             if moving:
                 yield Update(n, n - 1, time - begin)
             continue
-        if any(u["earthquake"][0] for u in updates[:n]) or not is_stored(asked, time):
+        if any(u["earthquake"][0] for u in updates[:n]) or not is_stored(request, time):
             continue
         # a further point of a path starts from the water of the first one's beginning
         before = min(begin + SAME_TIME, time - SAME_TIME)
@@ -345,17 +345,17 @@ class Wet:
         return {joint.number: known.heads_of(k) for k, joint in enumerate(self.network.joints)}
 
 
-def replayed(files: Files, asked: Asked, steps: Table) -> Iterator[Wet]:
+def replayed(files: Files, request: Request, steps: Table) -> Iterator[Wet]:
     """Yield the water of all networks that flow in time, after every update in which they do; the
     written one after a step without a set of nodes with voids.
     """
-    if not applies(files, asked):
+    if not applies(files, request):
         return
-    updates = updates_of(asked, steps)
-    plan = list(steps_of(asked, updates[0]))
+    updates = updates_of(request, steps)
+    plan = list(steps_of(request, updates[0]))
     if not plan:
         return
-    _, like = next(iter(states(files, asked, steps)))
+    _, like = next(iter(states(files, request, steps)))
     known: dict[tuple[int, int], Histories] = {}
     lost = set[int]()
 
@@ -385,38 +385,39 @@ def written(network: Network, updates: Sequence[Table]) -> Array:
     """
     pressure = np.zeros(len(network.nodes))
     for k, joint in enumerate(network.joints):
-        own, rows = network.nodes_of(k), updates[joint.number]
+        numbers, rows = network.nodes_of(k), updates[joint.number]
         rows = rows_where(rows, rows["weight"] == 0)
-        pressure[own] = rows["p"][np.asarray(cKDTree(places(rows)).query(network.nodes[own])[1])]
+        nearest = cKDTree(coordinates(rows)).query(network.nodes[numbers])[1]
+        pressure[numbers] = rows["p"][np.asarray(nearest)]
     return pressure
 
 
-def heads_in_time(files: Files, asked: Asked, steps: Table) -> dict[float, dict[int, Heads]]:
+def heads_in_time(files: Files, request: Request, steps: Table) -> dict[float, dict[int, Heads]]:
     """Return the heads in joints by their number, by the column `update` of the static loads."""
     found: dict[float, dict[int, Heads]] = {}
-    if not asked.joints[0]["time_unit"]:
+    if not request.joints[0]["time_unit"]:
         return found
-    first = updates_of(asked, steps)[0] if applies(files, asked) else []
-    for wet in replayed(files, asked, steps):
+    first = updates_of(request, steps)[0] if applies(files, request) else []
+    for wet in replayed(files, request, steps):
         found.setdefault(float(first[wet.number]["update"][0]), {}).update(wet.heads())
     return found
 
 
-def violations(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
+def violations(files: Files, request: Request, steps: Table) -> Iterator[str]:
     """Yield of each joint the step whose pressure is wrong, and by how much the worst one is; rows
     of history.csv with another mass of the water.
     """
     worst: dict[int, tuple[float, float]] = {}
     masses = dict[int, str]()
-    updates, room = updates_of(asked, steps), DIGITS if asked.joints[0]["dim"] == 2 else IN_3D
+    updates, room = updates_of(request, steps), DIGITS if request.joints[0]["dim"] == 2 else IN_3D
     rows = dict[float, int]()
-    for wet in replayed(files, asked, steps):
+    for wet in replayed(files, request, steps):
         rows = rows or rows_of_updates(files, steps)
         found = written(wet.network, [of[wet.number] for of in updates])
         row = rows.get(float(updates[0][wet.number]["update"][0]))
         for k, joint in enumerate(wet.network.joints):
-            own = wet.network.nodes_of(k)
-            error = float(np.abs(found[own] - wet.pressure[own]).max())
+            numbers = wet.network.nodes_of(k)
+            error = float(np.abs(found[numbers] - wet.pressure[numbers]).max())
             scale = joint.unit_weight * max(joint.level, joint.tail, joint.values["dam_height"])
             if not error <= room * scale and error > worst.get(joint.number, (0.0, 0.0))[0]:
                 worst[joint.number] = error, float(updates[0][wet.number]["time"][0])
@@ -453,9 +454,9 @@ def mass(files: Files, wet: Wet, joint: int, row: int) -> Iterator[str]:
             yield f"joint {number + 1}: {off} at t = {history['time'][row]:g}"
 
 
-def updates_of(asked: Asked, steps: Table) -> list[list[Table]]:
+def updates_of(request: Request, steps: Table) -> list[list[Table]]:
     """Return the updates of each joint."""
-    numbers = range(len(asked.joints))
+    numbers = range(len(request.joints))
     return [split_by(rows_where(steps, steps["joint"] == k + 1), "update") for k in numbers]
 
 

@@ -21,7 +21,7 @@ from damjoint.csr import CsrMatrix
 from damjoint.engines import engine_of
 from damjoint.fem import factor, memory
 from damjoint.input.parameters import interruptible, start_gmsh
-from damjoint.processes import ProcessKilled, pool_of
+from damjoint.processes import ProcessKilled, process_pool
 from damjoint.storage import atomic_write, locked_folder
 from PIL import Image
 from processes import without_progress
@@ -116,8 +116,8 @@ def test_an_interrupt_that_waits_for_an_import_is_no_failure(command, monkeypatc
 def test_worker_processes_end_with_their_parent(tmp_path):
     script = """
 import os, time
-from damjoint.processes import ProcessKilled, pool_of
-with pool_of(2) as pool:
+from damjoint.processes import ProcessKilled, process_pool
+with process_pool(2) as pool:
     print(*{pool.submit(os.getppid).result(), *pool._processes}, flush=True)
     time.sleep(600)
 """
@@ -174,7 +174,7 @@ print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
 def test_a_pool_does_not_wait_for_its_tasks_if_its_caller_is_interrupted():
 
     def interrupted():
-        with pool_of(1) as pool:
+        with process_pool(1) as pool:
             pool.submit(time.sleep, 60)
             raise KeyboardInterrupt
 

@@ -440,7 +440,7 @@ def test_the_strength_of_a_joint_is_a_band_of_both_signs():
     """Never negative, also where T exceeds it."""
     rows = {"time": np.arange(2.0), "T": np.array([-2e6, 1e6]), "shear_reserve": [1e6, -3e6]}
     axes = pictures.figure_of(4, 3).subplots()
-    draw_strength(axes, SimpleNamespace(joint=0, rows_of=lambda _: rows))
+    draw_strength(axes, SimpleNamespace(joint=0, joint_rows=lambda _: rows))
     assert_allclose([line.get_ydata() for line in axes.get_lines()], [(3, 0), (-3, 0)])
 
 

@@ -163,8 +163,8 @@ def test_the_water_of_every_step_follows_from_the_openings(tmp_path, settings):
     run = verified_quake(DAM | settings | {"record_rest": 0.1}, "35", record, tmp_path / "out")
     assert run.violations() == []
     other = "unchanged" if settings["quake_uplift"] != "unchanged" else "crack"
-    joints = tuple({**values, "quake_uplift": other} for values in run.asked.joints)
-    found = water_in_motion.violations(run.files, replace(run.asked, joints=joints), run.steps)
+    joints = tuple({**values, "quake_uplift": other} for values in run.request.joints)
+    found = water_in_motion.violations(run.files, replace(run.request, joints=joints), run.steps)
     assert any("Pa at t = " in words for words in found)
 
 
@@ -175,8 +175,8 @@ def test_the_stored_water_of_every_step_is_replayed(tmp_path):
     settings = {"uplift": "flow", "quake_uplift": "transient", "storage": 1e-12}
     run = verified_quake(DAM | settings | {"record_rest": 0.1}, "35", record, tmp_path / "out")
     assert run.violations() == []
-    joints = tuple({**values, "storage": 1.02e-12} for values in run.asked.joints)
-    found = water_in_time.violations(run.files, replace(run.asked, joints=joints), run.steps)
+    joints = tuple({**values, "storage": 1.02e-12} for values in run.request.joints)
+    found = water_in_time.violations(run.files, replace(run.request, joints=joints), run.steps)
     assert "joint 1: p of the flow in time off" in "".join(found)
 
 
@@ -331,17 +331,17 @@ def test_engines_that_differ_are_compared_again_with_shorter_steps(files, tmp_pa
     """Softening: a step of 5 ms may have several equilibria."""
     altered(files, tmp_path, "quake", "N", lambda v: 1.01 * v)
     other = Witness(replace(files.files, folder=tmp_path)).shaken
-    asked, scene = [], scene_of(tmp_path, "dam", ("getdp",))
+    options_given, scene = [], scene_of(tmp_path, "dam", ("getdp",))
 
     def again(changed, *options):
-        asked.append((changed.settings.get("dt"), options))
-        return other if len(asked) == 1 else files.shaken
+        options_given.append((changed.settings.get("dt"), options))
+        return other if len(options_given) == 1 else files.shaken
 
     measures, violated = quake_comparison.further_checks(scene, files.shaken, again)
     assert measures["engines"] == 0 and 1e-3 < measures["engines_at_dt"] and not violated
     getdp = ("--engine", "getdp")
-    assert [options for _, options in asked] == [getdp, (), getdp]
-    assert [dt for dt, _ in asked[1:]] == pytest.approx([0.005 / 8] * 2)
+    assert [options for _, options in options_given] == [getdp, (), getdp]
+    assert [dt for dt, _ in options_given[1:]] == pytest.approx([0.005 / 8] * 2)
     measures, violated = quake_comparison.further_checks(
         scene, files.shaken, lambda _, *options: other if options else files.shaken
     )

@@ -10,11 +10,11 @@ import pytest
 from damjoint import InputError, data
 from damjoint.input.resolve import load, varied
 from damjoint.mesh.mesh import mesh_of
-from damjoint.processes import ProcessKilled, pool_of
+from damjoint.processes import ProcessKilled, process_pool
 from damjoint.studies import keys
 from damjoint.studies.plan import Limits, Plan
 from damjoint.studies.result_file import result_file
-from damjoint.studies.sweep import key_of
+from damjoint.studies.sweep import row_key
 from own_mesh import OwnMesh
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
@@ -53,10 +53,10 @@ def test_the_content_of_a_mesh_is_part_of_the_key(command, tmp_path):
 
 def test_the_sides_of_a_mesh_are_part_of_the_key(tmp_path):
     case = own_case(tmp_path)
-    key = keys.key_of(case)
+    key = keys.study_key(case)
     other = {"downstream": "crest surface"}
-    assert keys.key_of(own_case(tmp_path, rename=other)) != key
-    assert keys.key_of(own_case(tmp_path)) == key
+    assert keys.study_key(own_case(tmp_path, rename=other)) != key
+    assert keys.study_key(own_case(tmp_path)) == key
 
 
 def test_the_key_of_a_geometry_follows_the_values_and_files_that_it_uses(tmp_path, monkeypatch):
@@ -85,8 +85,8 @@ def test_the_key_of_a_geometry_follows_the_values_and_files_that_it_uses(tmp_pat
     ],
 )
 def test_what_else_decides_a_row_is_part_of_the_key(case, plan):
-    keys = [key_of(load("c"), Plan({}, {}, {}))]
-    keys.append(key_of(load("c", case), Plan(**{"varied": {}, "sampled": {}, "tied": {}} | plan)))
+    keys = [row_key(load("c"), Plan({}, {}, {}))]
+    keys.append(row_key(load("c", case), Plan(**{"varied": {}, "sampled": {}, "tied": {}} | plan)))
     assert len(set(keys)) == 2
 
 
@@ -177,11 +177,11 @@ def test_a_killed_process_is_an_error_that_counts_the_saved_rows(command, tmp_pa
     def killed(tasks, jobs, scheduler):
         key, task = next(iter(tasks.items()))
         yield key, sweep.last_rows([task])[0]
-        with pool_of(1) as pool:
+        with process_pool(1) as pool:
             pool.submit(os._exit, 9).result()
 
     without_rows = r"^a process was killed \(out of memory\?\); --jobs 1"
-    with pytest.raises(ProcessKilled, match=without_rows), pool_of(1) as pool:
+    with pytest.raises(ProcessKilled, match=without_rows), process_pool(1) as pool:
         pool.submit(os._exit, 9).result()
     monkeypatch.setattr(sweep, "spread", killed)
     code, _, err = command(*WORDS, "--vary", "mu=0.5,0.6")

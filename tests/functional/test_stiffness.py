@@ -25,9 +25,9 @@ def test_repeated_runs_are_those_of_a_tenth_and_ten_times_the_stiffness(solve):
         (wanted,) = solve("dam", "45", **SMALL, K_T=K_T)
         assert result.case["K_T"] == pytest.approx(K_T)
         np.testing.assert_allclose(result.joint["delta_t1"], wanted.joint["delta_t1"], rtol=1e-9)
-    slips = [stiffness.state_of(result)["slip"] for _, result in runs]
+    slips = [stiffness.last_state(result)["slip"] for _, result in runs]
     assert slips[1] > 5 * slips[0] > 10 * slips[2] > 0  # slip of an elastic joint
-    assert len({f"{stiffness.state_of(r)['SSF']:.3f}" for _, r in runs}) == 1  # of the loads
+    assert len({f"{stiffness.last_state(r)['SSF']:.3f}" for _, r in runs}) == 1  # of the loads
 
 
 def test_the_command_prints_a_row_for_each_joint_and_what_is_refused(command):

@@ -23,11 +23,11 @@ def written(folder, level, steps):
 
 def test_state_after_twice_the_steps_is_compared(tmp_path):
     one, other = (written(tmp_path / str(steps), 40, steps) for steps in (2, 4))
-    asked = read(one.words)
-    assert list(again.other_steps(asked, one, other)) == []
+    request = read(one.words)
+    assert list(again.other_steps(request, one, other)) == []
     assert again.difference(one, other) < again.SAME_STATE
     elsewhere = written(tmp_path / "elsewhere", 40.001, 4)
-    (found,) = again.other_steps(asked, one, elsewhere)
+    (found,) = again.other_steps(request, one, elsewhere)
     assert "with twice the steps the jumps differ by" in found
 
 
@@ -46,9 +46,9 @@ def test_state_after_twice_the_steps_is_compared(tmp_path):
     ],
 )
 def test_states_that_follow_history_or_steps_are_not_compared(words, history, steps):
-    asked = read([*DAM.split(), *words.split()])
-    assert (again.follows_history(asked), again.follows_steps(asked)) == (history, steps)
-    assert again.follows_steps(asked, {"unstable_growth": [20.0]})
+    request = read([*DAM.split(), *words.split()])
+    assert (again.follows_history(request), again.follows_steps(request)) == (history, steps)
+    assert again.follows_steps(request, {"unstable_growth": [20.0]})
 
 
 @pytest.mark.parametrize(
@@ -84,19 +84,19 @@ def test_confirmed_levels_of_several_starts_agree():
 def test_statics_confirms_a_critical_level_or_not(tmp_path):
     below = written(tmp_path / "below", again.BELOW * SLIDES, 2)
     steps = read_table(below.folder / "steps.csv")
-    asked = read(below.words)
-    assert list(again.above(critical(SLIDES), below, asked, steps)) == []
+    request = read(below.words)
+    assert list(again.above(critical(SLIDES), below, request, steps)) == []
     # without the hardening that slip has added, which the search omits as well
     soft = tuple(word.replace("pena_tang=0", "pena_tang=-1") for word in below.words)
     slipped = steps | {"lambda": steps["lambda"] + 1.0}
     assert list(again.above(critical(SLIDES), below, read(soft), slipped)) == []
     low = written(tmp_path / "low", again.BELOW * 35, 2)
-    steps, asked = read_table(low.folder / "steps.csv"), read(low.words)
-    certain, allowed = again.above(critical(35.0), low, asked, steps)
+    steps, request = read_table(low.folder / "steps.csv"), read(low.words)
+    certain, allowed = again.above(critical(35.0), low, request, steps)
     assert "above the critical level 35 m there certainly is an equilibrium" == certain
     assert "sliding at the critical level 35 m, but statics allows" in allowed
-    assert not list(again.above(critical(35.0, doubt="not sure"), low, asked, steps))
-    assert not list(again.above(critical(35.0, mode=again.UNSTABLE), low, asked, steps))
+    assert not list(again.above(critical(35.0, doubt="not sure"), low, request, steps))
+    assert not list(again.above(critical(35.0, mode=again.UNSTABLE), low, request, steps))
 
 
 def test_commands_of_a_scene_for_its_critical_level():
@@ -104,7 +104,7 @@ def test_commands_of_a_scene_for_its_critical_level():
     rising = scene.rising_from(3.0, 6.0)
     assert rising.critical[:2] == ["critical", "dam"] and "--steps" not in rising.critical
     assert read(rising.critical).joints == read(rising.words).joints
-    asked = read(rising.words)
-    assert (asked.levels, asked.tail_levels, rising.steps) == ((3.0, 6.0), (2.5, 2.5), 4)
-    assert all(asked.joints[0][time] == 1 for time in LOAD_TIMES)
+    request = read(rising.words)
+    assert (request.levels, request.tail_levels, rising.steps) == ((3.0, 6.0), (2.5, 2.5), 4)
+    assert all(request.joints[0][time] == 1 for time in LOAD_TIMES)
     assert scene.rising_from(3.0, 2.0).levels == "3"

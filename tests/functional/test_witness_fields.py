@@ -152,10 +152,10 @@ def test_times_places_and_densities_of_loads_are_told_apart(tmp_path):
     def problems(check, **changed):
         new = {f"{name}={was:g}": f"{name}={to:g}" for name, (was, to) in changed.items()}
         other = tuple(new.get(word, word) for word in [*words, *SMALL.split()[:-1]])
-        files, asked = Files(tmp_path, other), read(other)
+        files, request = Files(tmp_path, other), read(other)
         if check is statics:
-            return list(statics.balance(files, asked))
-        return list(elasticity.violations(files, asked, read_table(tmp_path / "steps.csv")))
+            return list(statics.balance(files, request))
+        return list(elasticity.violations(files, request, read_table(tmp_path / "steps.csv")))
 
     for check, parameters in ((statics, OF_LOADS), (elasticity, OF_BODIES)):
         assert problems(check) == []

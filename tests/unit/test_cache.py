@@ -60,7 +60,7 @@ def test_bodies_in_the_cache_have_all_faces_under_water(tmp_path, monkeypatch):
         for case in (below, above)
     ]
     assert [sorted(heights) for heights in downstream] == [[0], [0, 35]]
-    assert cache.key_of(below) == cache.key_of(lower)
+    assert cache.bodies_key(below) == cache.bodies_key(lower)
 
 
 class Trap:
@@ -105,7 +105,7 @@ def flipped(whole, step=1):
 def test_an_entry_with_a_changed_bit_is_not_read(entry, monkeypatch):
     """Wherever it is: checksum, key, tree, the arrays' shapes and numbers."""
     file, _ = entry
-    header = json.dumps([cache.__version__, cache.sources(), cache.key_of(load("a", SMALL))])
+    header = json.dumps([cache.__version__, cache.sources(), cache.bodies_key(load("a", SMALL))])
     assert cache.read(file, header) is not None
     whole = file.read_bytes()
     heads = [i for i in range(len(whole)) if whole.startswith(b"\x93NUMPY", i)]
@@ -197,7 +197,7 @@ def test_nothing_is_written_through_links(entry, tmp_path_factory):
 def test_an_array_of_objects_is_not_loaded(entry, tmp_path):
     """Though the checksum is right."""
     file, written = entry
-    header = json.dumps([cache.__version__, cache.sources(), cache.key_of(load("a", SMALL))])
+    header = json.dumps([cache.__version__, cache.sources(), cache.bodies_key(load("a", SMALL))])
     with storage.write_entry(file, header) as damaged:
         damaged.write(b'{"arrays": 1, "tree": {"array": 0}}\n')
         np.save(damaged, np.array([Trap(tmp_path / "trap")]), allow_pickle=True)

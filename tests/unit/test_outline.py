@@ -11,8 +11,8 @@ from damjoint.model.fields import (
     SOFTENING,
     along,
     distance,
+    joint_states,
     nearest_rows,
-    state_of,
 )
 from damjoint.model.loads import STAGED, Loading
 from damjoint.pictures.outline import JointLine, section_outline, skin
@@ -141,11 +141,11 @@ def test_states_of_the_joint():
     """
     rows = {"damage": np.array([0, 0, 0.2, 0.2, 1]), "slip": np.array([0, 1e-3, 0, 1e-3, 1e-3])}
     expected = [CLOSED, SLIPPED, SOFTENING, SOFTENING, BROKEN]
-    assert state_of(rows, load("dam", {"law": "bond"}).law).tolist() == expected
+    assert joint_states(rows, load("dam", {"law": "bond"}).law).tolist() == expected
     friction = [CLOSED, SLIPPED, CLOSED, SLIPPED, BROKEN]
-    assert state_of(rows, load("dam", {"law": "friction"}).law).tolist() == friction
+    assert joint_states(rows, load("dam", {"law": "friction"}).law).tolist() == friction
     endo = rows | {"damage": np.array([0, 0, 0.7, 0.72, 0.73])}
-    assert state_of(endo, ENDO).tolist() == expected
+    assert joint_states(endo, ENDO).tolist() == expected
 
 
 #: Laws by name, with parameters for which tension breaks them.
@@ -167,7 +167,7 @@ def test_a_broken_joint_has_one_meaning(name):
     heals = name == "friction"
     for jump, broken in ((far, True), (closed, not heals)):
         rows = {"damage": law.damage(jump, after), "slip": law.slip(after, 1)}
-        assert law.is_broken(jump, after)[0] == broken == (state_of(rows, law)[0] == BROKEN)
+        assert law.is_broken(jump, after)[0] == broken == (joint_states(rows, law)[0] == BROKEN)
         assert not law.in_process_zone(jump, after)[0]
         assert law.cohesion_left(jump, after)[0] == pytest.approx(float(heals), abs=2e-3)
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from .. import __version__
 from ..arrays import Array
-from ..fem.cache import key_of, sources
+from ..fem.cache import bodies_key, sources
 from ..input.case import Case
 from ..storage import read_entry, write_entry
 from . import record_files
@@ -31,7 +31,9 @@ def fingerprint(case: Case, span: tuple[float, float] | None) -> str:
     record = record_files.record_bytes(case.record, case.record_vertical)
     values = [joint.values for joint in case.joints]
     loading = case.levels, case.tail_levels, case.times
-    scene = json.dumps([__version__, sources(), key_of(case), values, loading, span], default=str)
+    scene = json.dumps(
+        [__version__, sources(), bodies_key(case), values, loading, span], default=str
+    )
     return hashlib.sha256(scene.encode() + record).hexdigest()
 
 

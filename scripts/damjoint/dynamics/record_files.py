@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import InputError
 from ..arrays import Array, IntArray
-from ..storage import text_of
+from ..storage import read_limited_text
 
 #: Standard gravity [m/s2], for records in g.
 STANDARD_GRAVITY = 9.80665
@@ -94,7 +94,7 @@ def record_bytes(path: Path | None, vertical: Path | None = None) -> bytes:
 def read_one(path: Path) -> RecordFile:
     """The rows of a file. Raises InputError."""
     name = f"record = {path}"
-    lines = text_of(path, name, LONGEST).splitlines()
+    lines = read_limited_text(path, name, LONGEST).splitlines()
     if any(map(PEER.search, lines[:4])):
         return read_peer(name, lines)
     for number, line in enumerate(lines):
@@ -111,7 +111,7 @@ def read_peer(name: str, lines: list[str]) -> RecordFile:
                 words = [
                     (n, w) for n, row in enumerate(lines[number:], number + 1) for w in row.split()
                 ]
-                dt = number_of(name, number, match["dt"])
+                dt = parsed_number(name, number, match["dt"])
                 return of_values(name, words, int(match["n"]), dt, STANDARD_GRAVITY)
     raise InputError(f"{name}: must have NPTS and DT in its fourth line, as files of PEER have")
 
@@ -175,12 +175,12 @@ def of_values(
     if len(words) < number:
         raise InputError(f"{name}: must have {number} values, and has {len(words)}")
     lines = np.array([line for line, _ in words[:number]])
-    values = np.array([number_of(name, line, word) for line, word in words[:number]])
+    values = np.array([parsed_number(name, line, word) for line, word in words[:number]])
     rows = np.column_stack([interval * np.arange(number), unit * values, np.zeros(number)])
     return RecordFile(rows, lines, in_si=True)
 
 
-def number_of(name: str, line: int, word: str) -> float:
+def parsed_number(name: str, line: int, word: str) -> float:
     """A finite number in a line, by its number. Raises InputError."""
     with contextlib.suppress(ValueError):
         value = float(word)

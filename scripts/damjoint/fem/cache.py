@@ -45,7 +45,7 @@ PARAMETERS = (
 LIMIT = 2_000_000_000
 
 
-def key_of(case: Case) -> tuple[object, ...]:
+def bodies_key(case: Case) -> tuple[object, ...]:
     """All that condensed bodies depend on."""
     shape: object = tuple(shares(case).items())
     under_water: tuple[float, ...] = wet_segments(case)
@@ -90,7 +90,7 @@ def condensed_bodies(case: Case, engine: str = "condensed") -> tuple[Condensed, 
     engine: condensed; iterative, uncondensed bodies; auto, what is expected to be faster, or to
     have enough memory. Raises RunError (mesh, memory).
     """
-    header = json.dumps([__version__, sources(), key_of(case)])
+    header = json.dumps([__version__, sources(), bodies_key(case)])
     parent = cache_folder()
     path = parent and parent / f"bodies-{zlib.crc32(header.encode()):08x}.bin"
     stored = read(path, header) if path and engine != "iterative" else None

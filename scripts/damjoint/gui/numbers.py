@@ -163,7 +163,7 @@ def shown_rows(quake: QuakeResult, joint: int) -> Columns:
     """
     rows = {
         name: np.where(np.abs(column) > ROUND_OFF * np.abs(column).max(), column, 0.0)
-        for name, column in quake.rows_of(joint).items()
+        for name, column in quake.joint_rows(joint).items()
         if np.isfinite(column).all()  # a law may not limit shear
     }
     rows |= {name: np.maximum(rows[name], 0.0) for name in ("heel_opening", "toe_opening")}

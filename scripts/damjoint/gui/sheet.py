@@ -157,7 +157,7 @@ def first_block(case: Case) -> dict[str, Setting]:
         return {}
     if case.geometry:  # the mesh has the names of the joints
         return {n: case.values[n] for n in source.text.in_blocks if n not in source.overrides}
-    return {**source.blocks(case.joint_names).get(casefile.key_of(case.joint_names[0]), {})}
+    return {**source.blocks(case.joint_names).get(casefile.block_name(case.joint_names[0]), {})}
 
 
 def gmsh_value(label: str) -> float | str:

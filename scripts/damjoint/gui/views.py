@@ -21,8 +21,8 @@ from ..model.fields import (
     SOFTENING,
     distance,
     joint_body,
+    joint_states,
     nearest_rows,
-    state_of,
 )
 from ..studies.quake import RUNNING
 from ..units import LENGTHS, STRESSES, unit, unit_of_time, with_unit
@@ -304,7 +304,7 @@ def show_strips(gallery: Gallery, deformed: Deformed, display: Display) -> None:
     tag = add(0, f"opening [{name}]", opening, BALANCED, {**color_bar(1), "RangeType": 2})
     largest = np.max([np.abs(values).max(axis=(1, 2, 3)) for values in opening], axis=0)
     gallery.balance_about_zero(tag, largest, display.common)
-    states = np.array([state_of(r, case.law) for r in rows], float)[:, nearest]
+    states = np.array([joint_states(r, case.law) for r in rows], float)[:, nearest]
     # one state an element: between nodes of different states others would appear
     of_elements = [
         np.repeat(states[:, table].min(axis=2, keepdims=True), table.shape[1], axis=2)[..., None]

@@ -33,7 +33,7 @@ from typing import TypeAlias
 
 from .. import InputError, data
 from ..arrays import Value
-from ..storage import text_of
+from ..storage import read_limited_text
 from .arithmetic import arithmetic_value, explained
 from .parameters import (
     GEOMETRY_LISTS,
@@ -116,7 +116,7 @@ def written(case: CaseText) -> str:
     return "".join([*lines, assignments(case.defaults), *lists, *blocks])
 
 
-def key_of(joint: str) -> str:
+def block_name(joint: str) -> str:
     """The name of a joint in a case file: Joint::lift_12_5_m for "lift 12.5 m"."""
     return re.sub(r"\W", "_", joint)
 
@@ -130,7 +130,7 @@ def block(key: str, values: Mapping[str, Value]) -> str:
 def blocks_of(lists: Mapping[str, Sequence[Value]], joints: Sequence[str]) -> str:
     """The statements that say the same as lists with a value for each joint."""
     return "".join(
-        block(key_of(joint), {name: values[k] for name, values in lists.items()})
+        block(block_name(joint), {name: values[k] for name, values in lists.items()})
         for k, joint in enumerate(joints)
     )
 
@@ -148,7 +148,7 @@ def read_into(case: CaseText, path: Path) -> None:
     if case.files > MOST_FILES:
         raise InputError(f"case {path}: includes itself, or is one of more than {MOST_FILES} files")
     statement: list[Token] = []
-    text, first = text_of(path, f"case {path}", LONGEST), 0
+    text, first = read_limited_text(path, f"case {path}", LONGEST), 0
     for match in TOKEN.finditer(text):
         kind, token = match.lastgroup or "", match[0]
         if kind == "nothing":
@@ -307,7 +307,7 @@ def replace_in_blocks(case: CaseText, name: str, path: Path, where: str) -> None
 
 def keep_first_block(case: CaseText) -> None:
     """Remove the blocks of all joints but the first: there are no others any more."""
-    first = key_of(joint_name(float(case.defaults.get("joint_height", 0.0))))
+    first = block_name(joint_name(float(case.defaults.get("joint_height", 0.0))))
     case.blocks = {key: values for key, values in case.blocks.items() if key == first}
 
 

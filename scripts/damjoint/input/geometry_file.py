@@ -75,7 +75,7 @@ def files_of(path: Path, known: dict[Path, str]) -> dict[Path, str]:
     return known
 
 
-def state_of(path: Path) -> tuple[FileStates, set[str]]:
+def file_states(path: Path) -> tuple[FileStates, set[str]]:
     """State of the files of a user's own geometry; words of a .geo, its parameters among them."""
     texts = files_of(path, {}) if path.suffix == ".geo" else {path: ""}
     files = ((file, file.stat()) for file in texts)
@@ -115,7 +115,7 @@ def joints_in(path: Path, values: Mapping[str, Value]) -> tuple[str, ...]:
     values: of all parameters, of which a .geo file may use some. Raises InputError if it can not
     be read.
     """
-    files, words = state_of(path)
+    files, words = file_states(path)
     used = {n: v for n, v in values.items() if n in words or f"default_{n}" in words}
     return joints_by_gmsh(files, assignments(used), assignments(values))
 

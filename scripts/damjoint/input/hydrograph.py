@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import ROUND_OFF, InputError
-from ..storage import text_of
+from ..storage import read_limited_text
 
 #: Units of the time [s], by the name of the first column.
 SECONDS = {"seconds": 1.0, "hours": 3600.0, "days": 86400.0}
@@ -45,7 +45,8 @@ class Hydrograph:
 def read(path: Path) -> Hydrograph:
     """Read a hydrograph. Raises InputError."""
     name = f"hydrograph = {path}"
-    lines = [line for line in csv.reader(text_of(path, name, LONGEST).splitlines()) if line]
+    text = read_limited_text(path, name, LONGEST)
+    lines = [line for line in csv.reader(text.splitlines()) if line]
     head = [cell.strip() for cell in lines[0]] if lines else []
     if not head or head[0] not in SECONDS or head[1:] not in HEADS:
         raise InputError(

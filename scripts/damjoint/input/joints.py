@@ -10,7 +10,7 @@ from .. import InputError
 from ..arrays import Settings, Value, Values
 from .arithmetic import number
 from .case import SECTION, OfJoint
-from .casefile import joint_name, key_of
+from .casefile import block_name, joint_name
 from .geometry_file import joints_in
 from .parameters import INCLUDE, assignments, declared, listing, parse
 from .scene import stacked
@@ -41,7 +41,7 @@ def settings_of_joints(
     names = names_of_section(single, lifts)
     if geometry and blocks:
         names = names_of_geometry(single, geometry)
-    keys = [key_of(name) for name in names]
+    keys = [block_name(name) for name in names]
     for key in blocks:
         if keys.count(key) != 1:
             raise InputError(

@@ -48,9 +48,9 @@ class Source:
         if names and {"lift_heights", "joint_height"} & self.overrides.keys():
             lowest = float(self.text.defaults.get("joint_height", 0.0))
             heights = (lowest, *self.text.lists.get("lift_heights", ()))
-            before = [casefile.key_of(casefile.joint_name(height)) for height in heights]
+            before = [casefile.block_name(casefile.joint_name(height)) for height in heights]
             if len(before) == len(names) or len(names) == 1:
-                moved = dict(zip(before, map(casefile.key_of, names), strict=False))
+                moved = dict(zip(before, map(casefile.block_name, names), strict=False))
                 gone = before[len(names) :]
                 of_file, given = given, {}
                 remaining = [key for key in of_file if key not in gone]
@@ -76,7 +76,7 @@ class Source:
                 text.defaults[of_joint] = parameter(of_joint).check(others)
                 for values in text.blocks.values():
                     values.pop(of_joint, None)
-            text.blocks.setdefault(casefile.key_of(joint), {})[of_joint] = value
+            text.blocks.setdefault(casefile.block_name(joint), {})[of_joint] = value
             text.of_user.add(of_joint)
         return replace(self, overrides=merged, text=text)
 

@@ -55,7 +55,7 @@ def text_with_loading(file: CaseText, case: Case, names: Sequence[str]) -> str:
     file.lists |= {n: list(values) for n in GEOMETRY_LISTS if (values := getattr(case, n))}
     if file.of_joints and len(set(names)) == len(next(iter(file.of_joints.values()))):
         for k, name in enumerate(names):
-            block = file.blocks.setdefault(casefile.key_of(name), {})
+            block = file.blocks.setdefault(casefile.block_name(name), {})
             block |= {n: values[k] for n, values in file.of_joints.items()}
         file.of_joints = {}
     return casefile.written(file)

@@ -13,7 +13,7 @@ from .. import ROUND_OFF
 from ..arrays import Array, IntArray, distinct
 from ..csr import CsrMatrix, added, stacked
 from ..fem import elements
-from ..fem.cache import condensed_bodies, key_of
+from ..fem.cache import bodies_key, condensed_bodies
 from ..fem.condensed import Condensed, CondensedJoint
 from ..input.case import Case, OfJoint
 from ..input.scene import UP
@@ -307,7 +307,7 @@ class LastInterface:
     def of(self, case: Case) -> Interface:
         """The joints of a case with its condensed bodies."""
         rules = case["quadrature"], case["face_points"]
-        key = *key_of(case), *rules
+        key = *bodies_key(case), *rules
         if key not in self.last:
             small = [k for k, i in self.last.items() if i.bulk.size <= SMALL]
             self.last = {k: self.last[k] for k in small[-1:]}  # free the memory of others first

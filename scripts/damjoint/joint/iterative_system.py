@@ -17,7 +17,7 @@ from ..arrays import Array
 from ..fem.multigrid import Multigrid
 from ..fem.uncondensed import Uncondensed
 from .assembly import Assembly
-from .linear_system import Border, Stalled, Tangent, lift_of
+from .linear_system import Border, Stalled, Tangent, lift_matrix
 
 #: Residual over the right side at which a solution ends [-]: Newton's method corrects the rest, in
 #: one or two more iterations than with exact solutions.
@@ -52,7 +52,7 @@ class IterativeSystem:
         joints = self.assembly.whole(tangent.law)[on_joints].columns(on_joints).scipy()
         precondition = self.multigrid.cycle_with(joints)
         flow = tangent.flow
-        lift = lift_of(tangent.flowing) if flow else None
+        lift = lift_matrix(tangent.flowing) if flow else None
 
         def product(x: Array) -> Array:
             result: Array = elastic @ x

@@ -45,7 +45,7 @@ class Tangent:
     flowing: tuple[Flow, ...] = ()
 
 
-def lift_of(flowing: tuple[Flow, ...]) -> CsrMatrix:
+def lift_matrix(flowing: tuple[Flow, ...]) -> CsrMatrix:
     """Nodal forces of the pressures of flowing water (j, p)."""
     return stacked([part.lift.T for part in flowing]).T
 
@@ -86,7 +86,7 @@ class DenseSystem:
         """stiffness: S (j, j)."""
         self.assembly, self.stiffness = assembly, stiffness
         #: B (j, p), the nodal forces of the pressures of flowing water
-        self.lift = lru_cache(maxsize=1)(lift_of)
+        self.lift = lru_cache(maxsize=1)(lift_matrix)
 
     def solve(
         self, tangent: Tangent, right: Array, border: Border | None = None
@@ -111,7 +111,7 @@ class WoodburySystem:
         """stiffness: S (j, j); undamaged: tangent (q, 3, 3) of the undamaged joints."""
         self.assembly, self.stiffness, self.undamaged = assembly, stiffness, undamaged
         #: B (j, p), the nodal forces of the pressures of flowing water
-        self.lift = lru_cache(maxsize=1)(lift_of)
+        self.lift = lru_cache(maxsize=1)(lift_matrix)
         self._by_pressure: tuple[CsrMatrix, Array] | None = None
 
     def matrix(self) -> Array:

@@ -13,7 +13,7 @@ from .. import InputError, RunError
 from ..arrays import IntArray, Setting
 from ..input.case import Case
 from ..input.constraints import check_levels_on_mesh, check_strain
-from ..input.geometry_file import FileStates, state_of
+from ..input.geometry_file import FileStates, file_states
 from ..input.parameters import constants, start_gmsh
 from ..input.scene import POINT, Joint, numbered, stacked
 from ..input.values import has_point
@@ -63,7 +63,7 @@ def mesh_of(case: Case) -> Mesh:
     """The mesh of a case; a user's own geometry is read again unless it is Gmsh's current mesh."""
     if not case.geometry:
         return Mesh(case)
-    files, words = state_of(case.geometry)
+    files, words = file_states(case.geometry)
     used = shares(case) | {n: v for n, v in case.values.items() if n in words}
     geometry = GeometryFiles(files, tuple(used.items()), case)
     mesh = mesh_of_files(geometry)

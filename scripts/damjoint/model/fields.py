@@ -87,7 +87,7 @@ def along(rows: Table) -> Table:
 CLOSED, SLIPPED, SOFTENING, BROKEN = range(4)
 
 
-def state_of(rows: Table, law: Law[Any]) -> IntArray:
+def joint_states(rows: Table, law: Law[Any]) -> IntArray:
     """The state at each row of a joint's table: BROKEN, also closed, SOFTENING, SLIPPED, CLOSED."""
     # a law that does not soften has damage 0 or 1: values between are means over z
     softening = (rows["damage"] > 0) & law.softens

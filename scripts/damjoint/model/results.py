@@ -295,8 +295,8 @@ class Results:
             self,
             case=case,
             history=history,
-            joint=rows_of(self.joint, number, joint_columns(case)),
-            extrapolated=rows_of(self.extrapolated, number, joint_columns(case)),
+            joint=joint_rows(self.joint, number, joint_columns(case)),
+            extrapolated=joint_rows(self.extrapolated, number, joint_columns(case)),
             heel=self.heel if number == 0 else np.zeros(0),
         )
 
@@ -325,7 +325,7 @@ class Results:
         return self.case["drive"] == "level" and time < self.case.times[-1] - ROUND_OFF
 
 
-def rows_of(table: Table, number: int, columns: Collection[str]) -> Table:
+def joint_rows(table: Table, number: int, columns: Collection[str]) -> Table:
     """The rows and columns of a joint, by its number from 0."""
     if not table:
         return table

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from ..input.case import Case
 from ..input.scene import BED, DOWN, FLOOR, UP
-from ..model.fields import BROKEN, SOFTENING, along, state_of
+from ..model.fields import BROKEN, SOFTENING, along, joint_states
 from ..model.loads import Loading
 from ..model.results import Results
 from ..statics.gravity import GravityMethod
@@ -272,7 +272,7 @@ def draw_joint(axes: Axes, result: Results, method: GravityMethod) -> None:
     s = (x - x[0]) / np.ptp(x) if rows else none
     draw_lines(axes, under, method)
     if rows:
-        draw_states(axes, under, s, state_of(rows, result.case.law), label)
+        draw_states(axes, under, s, joint_states(rows, result.case.law), label)
     uplift = method.uplift.s / under.length, method.uplift.p
     computed_p, computed_stress = (rows.get(name, none) for name in ("p", "sigma_n_eff"))
     stress = f"effective stress, {SIGN}"

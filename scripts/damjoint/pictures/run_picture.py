@@ -27,7 +27,7 @@ from .. import ROUND_OFF
 from ..input.case import Case
 from ..input.values import has_point, level_unknown
 from ..mesh.body import Body
-from ..model.fields import Solution, along, distance, joint_body, nearest_rows, state_of
+from ..model.fields import Solution, along, distance, joint_body, joint_states, nearest_rows
 from ..model.loads import Loading
 from ..model.results import Results
 from ..post import validation
@@ -276,7 +276,7 @@ def draw_curves(axes: list[Axes], result: Results, time: float) -> None:
     3D), with the published values, or without any the stress of the gravity method.
     """
     case, curves = result.case, along(result.at(time))
-    s, states = curves["s"], state_of(curves, case.law)
+    s, states = curves["s"], joint_states(curves, case.law)
     jumps, normals, shears = axes
     draw_jumps(jumps, case, curves)
     factor = draw_normal_stress(normals, case, curves)
@@ -307,7 +307,7 @@ def finish_curves(figure: AnyFigure, axes: list[Axes], results: list[Results], t
 
 def mark_states(figure: AnyFigure, results: list[Results], time: float) -> None:
     """Write the legend of the states that occur at some joints."""
-    states = [state_of(along(joint.at(time)), joint.case.law) for joint in results]
+    states = [joint_states(along(joint.at(time)), joint.case.law) for joint in results]
     occurring = [STATES[n].patch() for n in STATES if any((part == n).any() for part in states)]
     if occurring:
         above = ABOVE_EDGE / figure_size(figure)[1]

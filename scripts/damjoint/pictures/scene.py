@@ -20,7 +20,7 @@ from ..input.case import Case
 from ..input.parameters import constants
 from ..input.scene import BED, DOWN, FLOOR, LINES, POINT, SIDES, TOP, UP
 from ..mesh.body import Body
-from ..model.fields import BROKEN, Field, distance, joint_body, nearest_rows, state_of
+from ..model.fields import BROKEN, Field, distance, joint_body, joint_states, nearest_rows
 from ..model.loads import COMPLETE, Loading, line_forces, thermal_strains
 from ..model.results import Results
 from ..statics import gravity
@@ -217,7 +217,7 @@ class JointShape:
     @property
     def damage_states(self) -> IntArray:
         """CLOSED to BROKEN on the near side, (steps, n)."""
-        return np.array([state_of(rows, self.case.law)[self.row] for rows in self.rows])
+        return np.array([joint_states(rows, self.case.law)[self.row] for rows in self.rows])
 
     @property
     def segment_states(self) -> IntArray:

@@ -196,12 +196,12 @@ def bulk_cells(bodies: dict[str, Body]) -> tuple[Cells, np.ndarray]:
     for name, body in bodies.items():
         cells += [(shape, table + first) for shape, table in body.cells]
         for region, (_, table) in zip(body.regions, body.cells, strict=True):
-            regions.append(np.full(len(table), number_of(name, region)))
+            regions.append(np.full(len(table), region_number(name, region)))
         first += len(body.points)
     return cells, np.concatenate(regions)
 
 
-def number_of(body: str, region: str) -> int:
+def region_number(body: str, region: str) -> int:
     """Number of a body's region: 1 dam, 1001 dam 2, ..."""
     _, _, which = body.partition(" ")
     layer = int(constants()["LAYER"][0]) * (int(which) - 1 if which else 0)

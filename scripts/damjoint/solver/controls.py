@@ -5,6 +5,7 @@ load unknown.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -12,7 +13,8 @@ from ..arrays import Array
 from ..input.case import Case
 from ..input.scene import POINT
 from ..joint.equilibrium import Equilibrium
-from ..joint.joint_laws import JointVariables
+from ..joint.interface import Interface
+from ..joint.joint_laws import JointLaws, JointVariables
 from ..model.loads import LEVEL, Loading, Unknown
 from .state import State
 
@@ -99,34 +101,38 @@ class DissipationControl(DisplacementControl):
     what is unknown, by which the path goes on where nothing breaks, too.
     """
 
+    laws: JointLaws
+    interface: Interface
     #: the internal variables and the jump (j,) at the step's beginning
     variables: JointVariables
     begin: Array
     #: what is unknown there, and the part of it in the energy [N m per m over its unit]
-    begun: float
+    unknown_at_begin: float
     shift: float
     #: what the residual is measured by [N]
     reference: float
 
     def measure(self, equilibrium: Equilibrium, jump: Array, loading: Loading) -> float:
         """See `DisplacementControl`."""
-        (before, t0, _), (now, t, _) = self.ends(equilibrium, jump)
-        compliance, plastic = self.unloading(equilibrium)
+        (before, t0, _), (now, t, _) = self.at_begin, self.at(jump)
+        compliance, plastic = self.unloading
         energy = t0 * (now - plastic * before + compliance * t0)
         energy -= t * (before - plastic * now + compliance * t)
-        joints = equilibrium.interface
+        joints = self.interface
         swept = joints.weights @ energy.sum(axis=1) / 2 / joints.joints[0].width
-        return float(swept + self.shift * (self.unknown.of(loading) - self.begun))
+        return float(swept + self.shift * (self.unknown.of(loading) - self.unknown_at_begin))
 
     def gradient(self, equilibrium: Equilibrium, jump: Array) -> Array:
         """See `DisplacementControl`."""
-        (before, t0, _), (now, t, tangent) = self.ends(equilibrium, jump)
-        compliance, plastic = self.unloading(equilibrium)
+        (before, t0, _), (now, t, tangent) = self.at_begin, self.at(jump)
+        compliance, plastic = self.unloading
         by_traction = before - plastic * now + 2 * compliance * t
-        pressed = (plastic[:, 0] == 0)[:, None] & (np.column_stack([now[:, 0], t[:, 0]]) <= 0)
-        t0[pressed[:, 0], 0] = by_traction[pressed[:, 1], 0] = 0
-        rate = t0 + plastic * t - np.einsum("qji,qj->qi", tangent, by_traction)
-        joints = equilibrium.interface
+        to_origin = plastic[:, 0] == 0
+        by_jump = t0.copy()
+        by_jump[to_origin & (now[:, 0] <= 0), 0] = 0
+        by_traction[to_origin & (t[:, 0] <= 0), 0] = 0
+        rate = by_jump + plastic * t - np.einsum("qji,qj->qi", tangent, by_traction)
+        joints = self.interface
         return np.asarray(joints.forces(rate) / 2 / joints.joints[0].width)
 
     def rate(self, equilibrium: Equilibrium, loading: Loading) -> float:
@@ -137,25 +143,34 @@ class DissipationControl(DisplacementControl):
         """See `DisplacementControl`."""
         return self.reference / abs(self.value)
 
-    def ends(self, equilibrium: Equilibrium, jump: Array) -> list[tuple[Array, Array, Array]]:
-        """Jumps (q, 3) of the points less what has been released, tractions (q, 3) and tangents
-        (q, 3, 3), at the step's beginning and at a jump (j,); without contact, which is elastic.
-        """
-        laws, interface = equilibrium.laws, equilibrium.interface
-        jumps = [interface.jumps(interface.at_points, end) for end in (self.begin, jump)]
-        released = laws.released_jump(self.variables)
-        ends = [(at - released, *laws.evaluate(at, self.variables)) for at in jumps]
-        to_origin = self.unloading(equilibrium)[1][:, 0] == 0
-        for at, traction, _ in ends:
-            at[to_origin, 0] = np.maximum(at[to_origin, 0], 0)
-            traction[to_origin, 0] = np.maximum(traction[to_origin, 0], 0)
-        return ends
+    @cached_property
+    def at_begin(self) -> tuple[Array, Array, Array]:
+        """`at` the step's beginning."""
+        return self.at(self.begin)
 
-    def unloading(self, equilibrium: Equilibrium) -> tuple[Array, Array]:
+    def at(self, jump: Array) -> tuple[Array, Array, Array]:
+        """Jumps (q, 3) of the points less what has been released, tractions (q, 3) and tangents
+        (q, 3, 3) at a jump (j,); without contact, which is elastic.
+        """
+        jumps = self.interface.jumps(self.interface.at_points, jump)
+        traction, tangent = self.laws.evaluate(jumps, self.variables)
+        jumps = jumps - self.released
+        to_origin = self.unloading[1][:, 0] == 0
+        for values in jumps, traction:
+            values[to_origin, 0] = np.maximum(values[to_origin, 0], 0)
+        return jumps, traction, tangent
+
+    @cached_property
+    def released(self) -> Array:
+        """`Law.released_jump` of the points (q, 3)."""
+        return self.laws.released_jump(self.variables)
+
+    @cached_property
+    def unloading(self) -> tuple[Array, Array]:
         """The compliance (q, 3) of elastic unloading from a plastic jump [m/Pa], and whether
         (1, 0) there is one along this axis: else tractions unload to the origin.
         """
-        compliance = equilibrium.laws.unloading_compliance(self.variables)
+        compliance = self.laws.unloading_compliance(self.variables)
         return compliance, (compliance > 0).astype(float)
 
 
@@ -187,7 +202,7 @@ class Prescribed:
         return self.control.rate(self.equilibrium, loading)
 
 
-def drive_of(case: Case, value: float = 0.0) -> DisplacementControl:
+def drive_control(case: Case, value: float = 0.0) -> DisplacementControl:
     """The control of a case by its parameter `drive`, at a displacement [m]."""
     unknown = Unknown(case["drive_load"])
     if case["drive"] == "heel":

@@ -27,7 +27,7 @@ import numpy as np
 from .. import InputError, RunError
 from ..arrays import Array, BoolArray, IntArray
 from ..csr import CsrMatrix
-from ..fem.cache import key_of
+from ..fem.cache import bodies_key
 from ..fem.condensed import Condensed
 from ..fem.moduli import Moduli
 from ..input.case import SECTION, Case
@@ -44,7 +44,7 @@ from ..laws import Law
 from ..mesh.generate import MARKS
 from ..model.loads import LEVEL, Loading
 from ..model.results import column_of, history_table
-from .controls import BodyControl, DisplacementControl, Prescribed, drive_of
+from .controls import BodyControl, DisplacementControl, Prescribed, drive_control
 from .history import History, JointState
 from .load_stepper import SAME_TIME
 from .model import Begun, Model, StepResult
@@ -313,7 +313,7 @@ class Differentiation:
         """names: of parameters, or of one of a joint, "lift 25 m.mu"; one_sided: whether the low
         sides have the values themselves. Raises InputError.
         """
-        self.model, self.names, self.key = model, list(names), key_of(model.case)
+        self.model, self.names, self.key = model, list(names), bodies_key(model.case)
         #: whether the equation of each side is evaluated apart, as its water follows from states
         #: before, or not linearly from the jumps
         self.apart = any(
@@ -390,7 +390,7 @@ class Differentiation:
             other = varied(case, {name: value})
             other = replace(other, levels=case.levels, tail_levels=case.tail_levels)
             other = replace(other, times=case.times)
-        if key_of(other) != self.key:
+        if bodies_key(other) != self.key:
             whole = Model(other)
             whole.equilibrium.laws = model.equilibrium.laws
             return whole
@@ -483,7 +483,7 @@ class Differentiation:
             if state.time == 0 and self.model.case["weight_first"]:
                 self.crest_at_rest = step.displacement("crest")
             if drives and state.time < case["drive_begin"] + SAME_TIME:
-                self.drive_from = step.measured(drive_of(case))
+                self.drive_from = step.measured(drive_control(case))
             if number in wanted or number == len(updates) - 1:
                 rates = {n: self.rate_of(v) for n, v in values(step).items()}
                 level = np.where(self.lost, np.nan, step.level_rate)

@@ -13,7 +13,7 @@ from ..input.case import Case
 from ..joint.interface import Interface
 from ..model.loads import LEVEL, Loading, Unknown
 from ..model.results import Info, Results
-from .controls import Control, DissipationControl, LevelControl, drive_of
+from .controls import Control, DissipationControl, LevelControl, drive_control
 from .history import History
 from .model import Model, StepOptions, StepResult
 from .path import PRECISION, ROUGH, SURE, EquilibriumPath, Point
@@ -124,7 +124,7 @@ class LoadStepper:
         share = (time - begin) / (end - begin)
         if case["drive"] == "dissipation":
             return self.dissipation(time)
-        return drive_of(case, self.displacement_at_begin + case["drive_by"] * share)
+        return drive_control(case, self.displacement_at_begin + case["drive_by"] * share)
 
     def run(self) -> Results:
         """Follow the times of the case from the last state on."""
@@ -165,7 +165,7 @@ class LoadStepper:
 
     def controlled_displacement(self) -> float:
         """The displacement that the case prescribes, in the last state [m]."""
-        return self.model.measure(drive_of(self.case), self.state)
+        return self.model.measure(drive_control(self.case), self.state)
 
     def dissipation(self, time: float) -> DissipationControl:
         """The control of the energy that is dissipated from the last state to a time."""
@@ -175,9 +175,11 @@ class LoadStepper:
         return DissipationControl(
             energy * (time - state.time) / duration,
             unknown=unknown,
+            laws=self.model.equilibrium.laws,
+            interface=self.model.equilibrium.interface,
             variables=self.model.begin(state, time).start.variables,
             begin=state.jump,
-            begun=unknown.of(state.loading),
+            unknown_at_begin=unknown.of(state.loading),
             shift=case.shared["dissipation_shift"][0] * energy / unit,
             reference=self.model.reference,
         )

@@ -138,7 +138,7 @@ def newton(
         criterion = convergence.reached(now, sizes[-1] if sizes else np.inf, evaluate)
         if criterion:
             return now, iterations, criterion
-        if end := end_of(now, sizes, strategy):
+        if end := stop_reason(now, sizes, strategy):
             raise NotConverged(end.format(now.size / (convergence.reference or 1.0)))
         if np.abs(now.jump).max() > convergence.largest_jump:
             raise Diverged(f"a displacement jump exceeds {convergence.largest_jump:.3g} m")
@@ -156,7 +156,7 @@ def newton(
         now = new
 
 
-def end_of(now: Iterate, sizes: list[float], strategy: Strategy) -> str:
+def stop_reason(now: Iterate, sizes: list[float], strategy: Strategy) -> str:
     """Why an iterate that has not converged is the last one; empty if it is not.
 
     sizes: norms of the residual before it.
@@ -179,7 +179,7 @@ def end_of(now: Iterate, sizes: list[float], strategy: Strategy) -> str:
 
 def cycles(sizes: list[float]) -> bool:
     """Whether the last residuals repeat those of a cycle before them, see CYCLES. Residuals that
-    are all the same stagnate, see `end_of`.
+    are all the same stagnate, see `stop_reason`.
     """
     return any(
         len(sizes) >= 2 * n

@@ -24,7 +24,7 @@ from ..input import parameters
 from ..input.arithmetic import explained, quantity
 from ..input.case import Case
 from ..input.resolve import varied
-from ..processes import as_finished, number_of
+from ..processes import as_finished, process_count
 from ..solver.load_stepper import LoadStepper
 from ..threads import limited_threads
 from . import sampling
@@ -444,7 +444,7 @@ class Fit:
     def computed_at(self, points: Sequence[Array]) -> list[Computed]:
         """What the case computes at several scaled parameters, in parallel."""
         work, cases = partial(trial, self.measurements), [self.at(point) for point in points]
-        jobs = number_of(self.jobs, len(cases))
+        jobs = process_count(self.jobs, len(cases))
         found = dict(as_finished(work, cases, jobs) if jobs > 1 else enumerate(map(work, cases)))
         self.runs += len(cases)
         return [found[number] for number in range(len(cases))]

@@ -22,7 +22,7 @@ from ..statics.gravity import GravityMethod
 from . import sensitivity
 from .check import CHECK, SafetyCheck, compare_joints, hand_calculation, worst_verdict
 from .check_tables import joints_table, picture_table
-from .keys import key_of
+from .keys import study_key
 
 
 def check_cases(
@@ -60,7 +60,7 @@ def check_case(task: tuple[Case, Path, str, dict[str, float]], progress: bool) -
     """Run a case into a folder, or read its results of an earlier command, and check it."""
     case, out, derivatives, deviations = task
     further = [derivatives, *deviations.items()] if derivatives else []
-    key = key_of(case, case.accuracy, case.also_uplift, *further)
+    key = study_key(case, case.accuracy, case.also_uplift, *further)
     folder_of = partial(folders.scene_folder, case, out=out)
     results = list[Results]()
     with contextlib.suppress(InputError):  # a file is missing or damaged

@@ -24,7 +24,7 @@ from ..input.parameters import declared, independent, parameter
 from ..input.resolve import resolve, varied
 from ..joint.interface import interface_of
 from ..model.results import Results, row_of_joint
-from ..session import end_of
+from ..session import study_end
 from ..solver.path import FALL, PRECISION, RISE, ROUGH, SURE, Point
 from ..statics.statement import REASONS, words_of_bound
 from ..statics.verdict import bound, highest_by_statics
@@ -582,7 +582,7 @@ class Search:
         """The result of a search that an error or an interrupt has ended: its last trials."""
         standing = [t for t in self.trials if t.stands]
         ends = [f"{t.value:.6g} {result_of(t)}" for t in self.trials[-2:]]
-        reason = str(error) or end_of(error)[0]
+        reason = str(error) or study_end(error)[0]
         doubt = f"{reason}: {', '.join(ends)}" if ends else reason
         point = point_at_target(standing[-1]) if standing else None
         return CriticalValue(None, "", "", doubt, point, error=error)

@@ -21,7 +21,7 @@ from ..post import folder as folders
 from ..post.field_files import write_fields
 from ..post.tables import write_csv
 from ..runner import early_end
-from ..session import Session, end_of, preparation, session
+from ..session import Session, preparation, session, study_end
 from ..solver.path import Point
 from ..statics.hints import tension_share
 from ..statics.statement import statement
@@ -159,7 +159,7 @@ def growth_lines(answer: CriticalValue) -> list[str]:
 
 def save(study: Session, search: Search, answer: CriticalValue) -> None:
     """Write the last equilibrium as `damjoint run` does, critical.csv and its picture."""
-    state, _ = end_of(answer.error)
+    state, _ = study_end(answer.error)
     shown = content(search, answer)
     entries: Info = {"critical": as_json(search, answer), "wall_seconds": {"search": study.seconds}}
     result, solution = shown.result, shown.solution

@@ -13,7 +13,7 @@ from ..mesh.mesh import mesh_of
 from ..versions import code_fingerprint
 
 
-def key_of(case: Case, *others: Any) -> str:
+def study_key(case: Case, *others: Any) -> str:
     """The key of a scene and its loading, and of others that decide the result."""
     return hashlib.sha256(repr([*case_identity(case), *others]).encode()).hexdigest()[:16]
 

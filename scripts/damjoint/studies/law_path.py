@@ -13,7 +13,7 @@ from ..arrays import Settings, Value
 from ..engines.getdp.law import evaluate
 from ..input.parameters import parameter
 from ..post.tables import write_csv
-from ..storage import text_of
+from ..storage import read_limited_text
 
 JUMPS = ("delta_n", "delta_t1", "delta_t2")
 #: Longest file of a path [bytes].
@@ -25,7 +25,7 @@ def read_path(path: Path) -> dict[str, np.ndarray]:
 
     Raises InputError.
     """
-    lines = text_of(path, f"path = {path}", LONGEST).splitlines()
+    lines = read_limited_text(path, f"path = {path}", LONGEST).splitlines()
     try:
         rows = list(csv.DictReader(lines, skipinitialspace=True))
     except csv.Error as error:

@@ -28,7 +28,7 @@ from ..joint.interface import interface_of
 from ..model.fields import Field
 from ..model.results import column_of
 from ..progress import Progress
-from ..session import end_of, preparation
+from ..session import preparation, study_end
 from ..solver.controls import LevelControl
 from ..solver.history import JointState
 from ..solver.load_stepper import LoadStepper
@@ -143,7 +143,7 @@ class QuakeRun:
         """The result up to now, or up to an error or interrupt."""
         self.history.end_at_complete_row(self.quake)
         where = f" after t = {self.quake.now.time:.6g} s of the record"
-        end = end_of(error, where) if error else (RUNNING, f"{RUNNING}{where}")
+        end = study_end(error, where) if error else (RUNNING, f"{RUNNING}{where}")
         return self._result_of(self.summary(), self.quake.now.state.trace, end, error)
 
     def summary(self) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from ..fem.factor import single_thread
 from ..input.case import Case
 from ..joint.interface import interface_of
 from ..post import folder as folders
-from ..session import end_of
+from ..session import study_end
 from ..solver.model import Model
 from ..statics.statement import statement
 from . import quake, quake_summary
@@ -51,7 +51,7 @@ def compute(case: Case, progress: bool = True) -> QuakeTables:
     summary["seconds"] = seconds | {"steps": number}
     if not error:
         summary["after"] = {"equilibrium": bool(computed.stands)}
-    end = end_of(error)
+    end = study_end(error)
     return QuakeTables.of(vibrations.case, static, summary, end, error=error, rows=rows)
 
 

@@ -160,7 +160,7 @@ def facts_of(result: QuakeResult) -> list[str]:
 
 def forces(result: QuakeResult) -> list[tuple[str, np.ndarray, str]]:
     """Curves of T and N' of the joint with the largest residual slip [MN/m]."""
-    rows, name = result.rows_of(result.joint), result.case.named((result.joint,))
+    rows, name = result.joint_rows(result.joint), result.case.named((result.joint,))
     end = f", {name}" if name else ""
     curves = (f"N'{end}", rows["N"], GREY), (f"T{end}", rows["T"], BLUE)
     return [(words, values / 1e6, color) for words, values, color in curves]
@@ -168,7 +168,7 @@ def forces(result: QuakeResult) -> list[tuple[str, np.ndarray, str]]:
 
 def draw_strength(axes: Axes, result: QuakeResult) -> None:
     """Draw the shear force that the same joint transmits as a band of both signs."""
-    rows = result.rows_of(result.joint)
+    rows = result.joint_rows(result.joint)
     strength = np.maximum(rows["shear_reserve"] + np.abs(rows["T"]), 0.0) / 1e6
     if np.isfinite(strength).all():  # a law may not limit shear
         style: dict[str, Any] = {"color": RED, "alpha": 0.12, "linewidth": 0}

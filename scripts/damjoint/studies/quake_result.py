@@ -101,7 +101,7 @@ class QuakeResult(QuakeTables):
         """Numbers of the joints."""
         return range(len(self.case.joints))
 
-    def rows_of(self, joint: int) -> Columns:
+    def joint_rows(self, joint: int) -> Columns:
         """The rows of a joint, by its number, with the columns of QUAKE."""
         of_joint = {name: column_of(name, joint) for name in QUAKE_OF_JOINTS}
         return {name: self.rows[of_joint.get(name, name)] for name in QUAKE}

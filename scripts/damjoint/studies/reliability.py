@@ -25,7 +25,7 @@ from ..input.case import Case
 from ..input.parameters import of_any_joint
 from ..input.resolve import varied
 from ..joint.interface import interface_of
-from ..processes import number_of
+from ..processes import process_count
 from ..solver.path import PRECISION
 from ..threads import limited_threads
 from . import keys, sampling
@@ -261,7 +261,7 @@ class CriticalLevels:
         None if it has none there. Raises InputError.
         """
         chosen = {n: v for n, v in row.items() if self.matters(joint, n)}
-        known = self.known[keys.key_of(self.case_of(joint, chosen), "reliability")]
+        known = self.known[keys.study_key(self.case_of(joint, chosen), "reliability")]
         names = self.differentiated(joint)
         texts = [known.get(rate_column(name), "") for name in names]
         if "" in texts:
@@ -293,7 +293,7 @@ class CriticalLevels:
         further = self.differentiated(joint) if rates else []
         chosen = [{n: v for n, v in row.items() if self.matters(joint, n)} for row in rows]
         cases = [self.case_of(joint, values) for values in chosen]
-        names = [keys.key_of(case, "reliability") for case in cases]
+        names = [keys.study_key(case, "reliability") for case in cases]
         column = rate_column(further[0]) if further else "critical_level"
         tasks = {
             key: (case, further)
@@ -303,7 +303,7 @@ class CriticalLevels:
         values_of = dict(zip(names, chosen, strict=True))
         if tasks:
             interface_of(next(iter(tasks.values()))[0])  # condensed before the processes start
-            jobs, work = number_of(self.jobs, len(tasks)), [[key] for key in tasks]
+            jobs, work = process_count(self.jobs, len(tasks)), [[key] for key in tasks]
             for key, result in spread_bundles(rows_of, work, tasks, jobs, self.client):
                 self.computed += 1
                 self.on_row(key, joint, values_of[key], result)

@@ -67,7 +67,7 @@ def repetitions(
                 yield f"{name}{label}", str(error)
 
 
-#: Columns of the table: name in `state_of`, heading, units.
+#: Columns of the table: name in `last_state`, heading, units.
 SHOWN = (
     ("level", "level", LENGTHS[:1]),
     ("crack_length", "crack", LENGTHS[:1]),
@@ -87,7 +87,7 @@ def table(runs: Sequence[tuple[str, Results | str]]) -> tuple[Table, list[str]]:
             continue
         for k, joint in enumerate(result.joints):
             labels.append((label, result.case.named((k,)), verdict(result)))
-            rows.append(state_of(joint))
+            rows.append(last_state(joint))
     columns = [(head, np.array([row[name] for row in rows]), units) for name, head, units in SHOWN]
     columns.append(("SSF", np.array([row["SSF"] for row in rows]), NUMBER))
     cells = formatted_table(columns)
@@ -140,7 +140,7 @@ def lines(runs: Sequence[tuple[str, Results | str]], width: int | None = None) -
     return [*text, *messages]
 
 
-def state_of(result: Results) -> dict[str, float]:
+def last_state(result: Results) -> dict[str, float]:
     """The last row of a joint's history, its mean tangential jump [m] and its sliding factor."""
     last, case = result.last, result.case
     factor = np.inf

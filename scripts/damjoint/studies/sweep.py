@@ -23,7 +23,7 @@ from ..joint.interface import Interface, interface_of
 from ..model.results import history_columns
 from ..post.folder import case_entries
 from ..post.summary import Draw, aligned, fitted
-from ..processes import ProcessKilled, as_finished, check_jobs, number_of
+from ..processes import ProcessKilled, as_finished, check_jobs, process_count
 from ..progress import Progress, track
 from ..solver.load_stepper import LoadStepper
 from ..statics.limit import mechanism
@@ -50,14 +50,14 @@ from .quake_summary import NO_FRICTION, NOT_AT_REST, QUAKE_COLUMNS
 from .result_file import rows_session
 
 
-def key_of(case: Case, plan: Plan) -> str:
+def row_key(case: Case, plan: Plan) -> str:
     """The key of a row in a result file: of all that decides it, and what a plan computes of it."""
     given = case.source.overrides if case.source else {}
     quick = sorted(QUICK.keys() & given.keys()) if plan.critical else []
     others = [bool(plan.sampled), plan.critical, quick, plan.quake and plan.quake.listed]
     if plan.quake:
         others.append(record_files.record_bytes(case.record, case.record_vertical))
-    return keys.key_of(case, *others)
+    return keys.study_key(case, *others)
 
 
 #: Columns of the outcome: whether the dam fails (1, the exit code of `damjoint run`) or stands (0),
@@ -216,7 +216,7 @@ def planned(case: Case, plan: Plan) -> Iterator[tuple[str, Values, Task]]:
         if varied.geometry and varied.stores_water:
             engine_of(varied, "auto")  # checks the paths of the water
         task = Task(varied, bool(plan.sampled), search, plan.critical_columns, plan.quake)
-        yield key_of(varied, plan), row, task
+        yield row_key(varied, plan), row, task
 
 
 def source_of(case: Case) -> Source:
@@ -238,7 +238,7 @@ def bundles(tasks: dict[str, Task]) -> list[list[str]]:
     groups: dict[str, list[str]] = {}
     for key, task in tasks.items():
         same = replace(task.case, levels=(), tail_levels=(), times=())
-        groups.setdefault(keys.key_of(same), []).append(key)
+        groups.setdefault(keys.study_key(same), []).append(key)
     return [
         group[i : i + MOST_TOGETHER]
         for group in groups.values()
@@ -361,7 +361,7 @@ class PlannedRows:
         if first.search:
             first.search()  # checks the quantity
         interface_of(first.case)  # condensed before the processes start, which read it
-        return spread(tasks, number_of(jobs, len(tasks)), scheduler)
+        return spread(tasks, process_count(jobs, len(tasks)), scheduler)
 
 
 def meshed(case: Case) -> tuple[Case, str]:

@@ -18,7 +18,7 @@ def values_of_paths(mesh: Mesh, case: Case) -> list[str]:
     Raises InputError for networks that this engine can not compute.
     """
     alone = [WaterPath.of(joint) for joint in case.joints]
-    texts = [text_of(path) if path else "" for path in alone]
+    texts = [path_text(path) if path else "" for path in alone]
     for network in water_networks(mesh.joints, case.joints):
         solid = mesh.dim == 3
         paths = side_by_side(network, mesh, case) if solid else in_plane(network, mesh, case)
@@ -35,11 +35,11 @@ def values_of_paths(mesh: Mesh, case: Case) -> list[str]:
                 "joint_path": float(network.numbers[0] if solid else k),
                 "level_ends": float(not solid or has_level_ends(network.mesh)),
             }
-            texts[k] = text_of(paths[k]) + lines(values)
+            texts[k] = path_text(paths[k]) + lines(values)
     return texts
 
 
-def text_of(path: WaterPath) -> str:
+def path_text(path: WaterPath) -> str:
     """The values of pro/joints.pro of a path."""
     values = {f"path_{name}": getattr(path, name) for name in ("heel_y", "toe_y", "rest_y")}
     values |= {"path_begin": path.begin, "path_end": path.end, "path_exits": float(path.exits)}

@@ -39,14 +39,14 @@ PRINTED_OF_WATER = ["water", "water_in", "void", "p_max", "p_min"]
 
 
 def read_simple_table(path: Path, components: int = 3) -> tuple[np.ndarray, np.ndarray]:
-    """Points (elements x nodes, 3) and values (elements x nodes, components) of a SimpleTable.
+    """Points (elements, nodes, 3) and values (elements, nodes, components) of a SimpleTable.
 
     Raises OSError, ValueError if the file is missing or incomplete.
     """
     check_end(path, "\n")
     table = np.loadtxt(path, ndmin=2)
-    points = 3 * table.shape[1] // (3 + components)
-    return table[:, :points].reshape(-1, 3), table[:, points:].reshape(-1, components)
+    points, values = np.split(table, [3 * table.shape[1] // (3 + components)], axis=1)
+    return points.reshape(len(table), -1, 3), values.reshape(len(table), -1, components)
 
 
 def nodes_of(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -127,8 +127,12 @@ def read_joint(
     """
     joint_case = case.joints[joint]
 
-    def table(name: str, components: int = 3) -> tuple[np.ndarray, np.ndarray]:
+    def elements(name: str, components: int = 3) -> tuple[np.ndarray, np.ndarray]:
         return read_simple_table(folder / f"{name}_{joint}_{number}.txt", components)
+
+    def table(name: str, components: int = 3) -> tuple[np.ndarray, np.ndarray]:
+        points, values = elements(name, components)
+        return points.reshape(-1, 3), values.reshape(-1, components)
 
     def more(name: str) -> np.ndarray:
         """A column that not every joint has."""
@@ -159,18 +163,15 @@ def read_joint(
         [when, nodes, jump[:, order], traction[:, order], state, distance, *others]
     )
     extrapolated = averaged.copy()
-    file = folder / f"mean_jump_0_{joint}_{number}.txt"
-    corners, _ = read_simple_table(file)
-    _, corner_rows = nodes_of(np.vstack([nodes, corners]))
-    corner_rows = corner_rows[len(nodes) :]
-    present = np.unique(corner_rows)
-    with file.open() as lines:
-        count = len(corners) // sum(1 for _ in lines)  # corners of an element
     for columns, name in (slice(6, 9), "jump"), (slice(9, 12), "traction"):
-        moments = np.array([table(f"mean_{name}_{k}")[1] for k in range(len(MOMENTS))])
-        values = corner_values(corners.reshape(-1, count, 3), moments[:, ::count])
+        means = [elements(f"mean_{name}_{k}") for k in range(len(MOMENTS))]
+        corners = means[0][0]
+        values = corner_values(corners, np.array([values[:, 0] for _, values in means]))
+        _, corner_rows = nodes_of(np.vstack([nodes, corners.reshape(-1, 3)]))
+        corner_rows = corner_rows[len(nodes) :]
         with np.errstate(invalid="ignore"):
             at_nodes = node_means(corner_rows, values[:, order], len(nodes))
+        present = np.unique(corner_rows)
         extrapolated[present, columns] = at_nodes[present]
     return averaged, extrapolated
 
