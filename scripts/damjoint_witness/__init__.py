@@ -12,7 +12,10 @@ again, slowly and plainly, from the formulas of reference/theory.md.
 | `laws/`, `replay` | traction, damage, slip of every step at every node and integration point |
 | `tables` | completeness of the tables, integrals over the joint, rows of the nodes |
 | `solids` | reads the bodies' mesh; functions and quadrature on their sides |
+| `joint_state` | a joint at a time: openings, heads at its ends, pressure by a head |
+| `network` | heads of the water that flows in joints that meet |
 | `water` | pressure and flux, from the openings |
+| `finite_elements`, `body_loads` | bodies by scikit-fem; loads on their faces, lines and volume |
 | `elasticity` | displacement jumps, from loads and tractions of the joints |
 | `again` | independence of steps; critical values |
 | `stops` | whether there is no equilibrium beyond the last state, by limit analysis |

@@ -15,20 +15,12 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from .files import Files, Table, rows_where, split_by
+from .joint_state import JointState, coordinates, pressure, states, with_all_digits
+from .network import FLOWING, heads_of
 from .reader import Request
 from .replay import gaping
 from .solids import Array
-from .water import (
-    DIGITS,
-    FLOWING,
-    IN_3D,
-    JointState,
-    coordinates,
-    heads_of,
-    pressure,
-    states,
-    with_all_digits,
-)
+from .water import DIGITS, IN_3D
 
 
 def violations(files: Files, request: Request, steps: Table) -> Iterator[str]:

@@ -20,26 +20,21 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from .files import Files, Table, rows_where, split_by
-from .reader import Request
-from .solids import Array, IntArray, functions
-from .water import (
-    DIGITS,
-    IN_3D,
-    PRECISION,
+from .joint_state import (
     SAME_TIME,
-    Flow,
-    Graph,
     Heads,
     JointState,
-    Network,
     coordinates,
     is_stored,
     joint_rule,
-    networks,
     states,
     update_at,
     with_all_digits,
 )
+from .network import PRECISION, Flow, Graph, Network, networks
+from .reader import Request
+from .solids import Array, IntArray, functions
+from .water import DIGITS, IN_3D
 
 #: Number of the state before the first update, without loads: closed joints, no water.
 UNLOADED = -1

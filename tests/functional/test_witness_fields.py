@@ -8,7 +8,7 @@ import shutil
 import numpy as np
 import pytest
 from damjoint import cli
-from damjoint_witness import elasticity, statics, water, water_in_time
+from damjoint_witness import elasticity, network, statics, water, water_in_time
 from damjoint_witness.files import Files, read_table
 from damjoint_witness.reader import read
 
@@ -295,7 +295,7 @@ def test_water_where_joints_meet_in_3d(tmp_path, uplift, level, tail):
 
 def test_elimination_in_a_network_is_exact_for_any_conductances():
     """Three lines from a node, one of them closed: the head by hand."""
-    graph = water.Graph(np.array([[0, 3], [1, 3], [2, 3]]), np.array([1e18, 1.0, 3.0]), 4)
+    graph = network.Graph(np.array([[0, 3], [1, 3], [2, 3]]), np.array([1e18, 1.0, 3.0]), 4)
     flow = graph.solve({0: 30.0, 1: 20.0, 2: 10.0})
     assert flow.drops[0] == pytest.approx((10 + 3 * 20) / 1e18, rel=1e-12)
     assert flow.inflow == pytest.approx([70, -10, -60, 0], rel=1e-12)
