@@ -18,8 +18,8 @@ def add(command: Parser) -> None:
         metavar="FAMILY|CASE",
         default=["ssnp142"],
         help="families of tests (ssnp142, ssnp133, ssnp143, ssnp162, ssnp164, ssnv503, ssnp166, "
-        "sdnv138, wtnp128; all) or cases, such as the modelings a to k of SSNP142 (default: "
-        "ssnp142)",
+        "sdnv138, slammer, wtnp128; all) or cases, such as the modelings a to k of SSNP142 "
+        "(default: ssnp142)",
     )
     command.add_path(
         "--out",

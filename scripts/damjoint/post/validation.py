@@ -28,6 +28,7 @@ FAMILIES = {
     "ssnv503": "a slider on a plane of 30 degrees: sticks at 99 %, slips at 101 % of the friction",
     "ssnp166": "a notched beam, exponential softening: the force on it beyond its maximum",
     "sdnv138": "the dam of SSNP142 C and J in an earthquake: near overturning; with a dry joint",
+    "slammer": "Newmark's rigid block: slips of SLAMMER under records in both signs; under a sine",
     "wtnp128": "a specimen with water in its notch, split by wedges slowly and fast: flow in time",
 }
 #: How a published number was read, column `read_as`: at a node; there from the Gauss points, as the

@@ -15,7 +15,7 @@ from ..post.validation import FAMILIES, Comparison
 from ..processes import in_processes
 from ..runner import run
 from ..statics.statement import statement
-from . import law_tests, path_tests, quake_tests, wedge_tests
+from . import block_tests, law_tests, path_tests, quake_tests, wedge_tests
 
 
 def chosen(names: Sequence[str]) -> dict[str, list[str]]:
@@ -51,6 +51,8 @@ def tests_without_case(family: str, engine: str) -> dict[str, Callable[[], dict[
         tests[name] = partial(path_tests.follow, path, engine)
     for name, quake in quakes.items():
         tests[name] = partial(quake_tests.follow, quake, validation.last_time(family))
+    for name, block in block_tests.FAMILIES.get(family, dict)().items():
+        tests[name] = partial(block_tests.follow, block)
     for name, wedge in wedges.items():
         tests[name] = partial(wedge_tests.follow, wedge)
     return tests
