@@ -772,13 +772,19 @@ def test_the_interval_has_the_highest_level_of_every_path(monkeypatch):
     assert f"between {low:.6g} and {high:.6g} m" in answer.doubt
 
 
+@pytest.fixture(scope="module")
+def modeling_k():
+    """The search of its critical level."""
+    return search_result("k")
+
+
 @pytest.mark.heavy
-def test_the_first_unstable_growth_of_a_law_without_friction_is_the_critical_level():
+def test_the_first_unstable_growth_of_a_law_without_friction_is_the_critical_level(modeling_k):
     """Modeling K: the crack grows above the last published level under load control; beyond it
     there are equilibria up to the level at which the rigid block overturns, by a displacement and
     by relaxation.
     """
-    search, answer = search_result("k")
+    search, answer = modeling_k
     assert answer.mode == "unstable crack growth" and answer.confirmed
     assert answer.value == answer.growth > 3.34
     overturns = WEIGHT * (BASE - CENTROID) / (WATER * HEIGHT**2 / 2)
@@ -796,9 +802,11 @@ def test_the_first_unstable_growth_of_a_law_without_friction_is_the_critical_lev
 
 @pytest.mark.heavy
 @pytest.mark.parametrize("engine", ["condensed", "getdp"])
-def test_the_crack_grows_unstably_under_a_level_above_the_critical_one(engine, tmp_path):
-    """Modeling K, level by level: no crack just below it, two elements at once just above it."""
-    _, answer = search_result("k")
+def test_the_crack_grows_unstably_under_a_level_above_the_critical_one(
+    engine, tmp_path, modeling_k
+):
+    """Level by level: no crack just below it, two elements at once just above it."""
+    _, answer = modeling_k
     cracks = []
     for part in (1 - 1e-3, 1 + 1e-3):
         case = load("k", {"drive": "level"}, f"1,2,3,{part * answer.value}")
