@@ -20,10 +20,12 @@ FLUXES: Units = tuple((f"{name}g/(m s)", 1000.0**i) for i, name in enumerate(["k
 
 
 def unit(values: Iterable[np.ndarray], units: Units) -> tuple[str, float]:
-    """The first unit in which the largest value is at least 1, or the first; name and factor."""
+    """The first unit in which the largest value is at least 1; of zeros mm, or the first one; name
+    and factor.
+    """
     largest = max((np.abs(v).max(initial=0) for v in values), default=0)
     if not largest:
-        return units[0]
+        return next((u for u in units if u[0] == "mm"), units[0])
     return next((u for u in units if largest * u[1] >= 1), units[-1])
 
 

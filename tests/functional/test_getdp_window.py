@@ -282,6 +282,25 @@ def test_values_of_joints_are_those_of_python():
     assert set(listed("joint_automatic")) == {n for n, known in own.items() if known.automatic}
 
 
+def shake_in_gmsh(project, name, record, settings):
+    """Run a case with Gmsh and GetDP, on a coarse mesh, through a record in its .pro file."""
+    lines = (project / f"{name}.pro").read_text().splitlines(keepends=True)
+    record += "damping_a0 = 0; damping_a1 = 1e-3;\n"
+    (project / f"{name}.pro").write_text("".join([*lines[:-1], record, lines[-1]]))
+    coarse = {"n_joint": 6, "order": 1, "h_dam": 20, "h_found": 60, "n_levels": 1, "dt": -1}
+    run_in_gmsh(project, name, coarse | settings)
+
+
+def test_a_dam_that_fails_by_the_earthquake_is_red(project):
+    """The pulse breaks the joint, whose friction alone does not hold the dam at rest."""
+    record = "record_x() = {0, 0, 0.1, 9, 0.2, 0}; record_y() = {0, 0, 0.2, 0};\n"
+    weak = {"level_1": 44, "mu": 0.4, "adhesion": 3e5, "sigma_max": 1e5, "G_f": 10, "G_t": 100}
+    shake_in_gmsh(project, "dam", record + "default_dt = 0.02;\n", weak)
+    assert (project / "res/dam/after.txt").read_text().strip() == "0"
+    status = (project / "res/dam/status.geo").read_text()
+    assert "'fails by the earthquake', " in status and "Tomato" in status
+
+
 @pytest.mark.parametrize(
     "name, given, steps",
     further(
@@ -297,15 +316,12 @@ def test_an_earthquake_has_the_time_step_of_its_problem(project, name, given, st
     """As Gmsh's tree, made by the .geo file, has none (-1): that of the .pro file with the record,
     or half of the record's shortest interval.
     """
-    lines = (project / f"{name}.pro").read_text().splitlines(keepends=True)
     record = "record_x() = {0, 0, 0.01, 0.5, 0.06, 0}; record_y() = {0, 0, 0.06, 0};\n"
-    record += "damping_a0 = 0; damping_a1 = 1e-3;\n"
-    (project / f"{name}.pro").write_text("".join([*lines[:-1], record, given, lines[-1]]))
-    coarse = {"n_joint": 6, "order": 1, "h_dam": 20, "h_found": 60, "n_levels": 1, "level_1": 30}
-    run_in_gmsh(project, name, coarse | {"dt": -1})
+    shake_in_gmsh(project, name, record + given, {"level_1": 30})
     rows = (project / f"res/{name}/quake.txt").read_text().splitlines()
     assert [float(row.split()[7]) for row in rows[1:]] == pytest.approx([0.06 / steps] * steps)
     assert (project / f"res/{name}/after.txt").read_text().strip() == "1"
+    assert "'complete', " in (project / f"res/{name}/status.geo").read_text()
     for curve in range(2):  # of the crest, of the slip: over the time
         ((points,),) = points_of_views(project / f"res/{name}/motion_{curve}.pos").values()
         assert points == pytest.approx([float(row.split()[1]) for row in rows])

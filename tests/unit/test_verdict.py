@@ -127,7 +127,7 @@ def test_the_statement_gives_the_mechanism_found_on_the_path():
     }
     statement = statement_of(result)
     assert statement.startswith("sliding: no equilibrium beyond level 2 m")
-    assert "followed to 4.2 times that displacement, reaches 2.5 m at most" in statement
+    assert "2.5 m at most (followed to 4.2 times the displacement of that level)" in statement
 
 
 def test_a_statement_after_unstable_crack_growth_names_its_lowest_level():

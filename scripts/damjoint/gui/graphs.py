@@ -46,7 +46,7 @@ class Scale:
     def of(values: np.ndarray, units: Units) -> Scale:
         """The scale that covers values and zero; zero in the middle if all values are zero."""
         values = np.where(np.abs(values) * units[-1][1] < TINY, 0.0, values)
-        name, factor = unit([values], units) if values.any() else units[0]
+        name, factor = unit([values], units)
         low, high = min(0.0, values.min() * factor), max(0.0, values.max() * factor)
         if low == high:
             return Scale(-INTERVALS / 2, 1.0, name, factor)

@@ -94,7 +94,7 @@ class Numbers:
         for name, head, units, meaning in columns:
             both = [method[name] for method in (self.elements, self.rigid) if name in method]
             finite = np.nan_to_num(both, posinf=0.0)
-            size, factor = unit([finite], units) if finite.any() else units[0]
+            size, factor = unit([finite], units)
             values = BESIDE.join(three_digits(value * factor) for value in both)
             if both and not (name in OPTIONAL and not any(both)):
                 rows.append((f"{head} [{size}]" if size else head, values, meaning))

@@ -17,8 +17,8 @@ from .run_picture import VIEW
 
 #: Largest displacement in the picture over the dam's size; ground around the dam.
 DRAWN, AROUND = 0.12, 0.25
-#: Size of a drawn mode [inches]; modes that are drawn.
-PANEL, MOST = 2.6, 5
+#: Size of a drawn mode [inches]; modes that are drawn; letters of the heading in an inch.
+PANEL, MOST, LETTERS = 2.6, 5, 13
 
 
 def draw(natural: NaturalModes, about: str, path: Path) -> None:
@@ -31,7 +31,7 @@ def figure(natural: NaturalModes, about: str) -> Figure:
     """The shapes of the modes with water on elastic rock, all frequencies; about: their case."""
     first = natural.variants[0]
     number = min(len(first.modes), MOST)
-    words = textwrap.wrap(f"{natural.case.title}: {about}", 44 * number)
+    words = textwrap.wrap(f"{natural.case.title}: {about}", int(LETTERS * PANEL * number))
     head = 0.15 + 0.17 * len(words)
     foot = 0.2 + 0.17 * len(natural.variants)
     width, height = PANEL * number + 0.2, head + 0.4 + PANEL + foot

@@ -140,8 +140,8 @@ def state_label(case: Case, state: Mapping[str, float]) -> str:
     )
     label = ", ".join(filter(None, [*forces, f"SSF {factor:.3g}" if known else "", acting]))
     plain = case["factor_mu"] == case["factor_c"] == 1
-    if case["law"] == "bond" and case["sigma_max"] > 0 and plain and factor < 1:
-        label += "; SSF < 1: N' is less the joint's tension, friction acts under its compression"
+    if case["law"] == "bond" and case["sigma_max"] > 0 and plain and float(f"{factor:.3g}") < 1:
+        label += " (below 1 in equilibrium: tension in the joint lowers N', but no friction)"
     return label
 
 

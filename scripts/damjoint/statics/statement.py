@@ -71,10 +71,11 @@ def reason_of_stop(results: Results) -> str:
         where += f", after unstable crack growth at level {min(grown):.6g} m"
     if shown:
         ratio = shown["displacement_ratio"]
-        along = f", followed to {ratio:.2g} times that displacement," if ratio > 1 else ""
+        along = f" (followed to {ratio:.2g} times the displacement of that level)"
         most = shown["level"]
         with_all = f" under the loads of t = {shown['time']:g}" if most < last["level"] else ""
-        path = f"the equilibrium path{along} reaches {most:.6g} m at most{with_all}"
+        path = f"the equilibrium path reaches {most:.6g} m at most{with_all}"
+        path += along if ratio > 1 else ""
         return f"no equilibrium beyond {where}: {path}"
     reached = bound(results)
     if reached.mode:

@@ -75,7 +75,7 @@ class Table(NamedTuple):
         """The numbers of the rows, in an order, by the values of some names, as text."""
         curves: dict[str, list[int]] = {}
         for i in order:
-            key = ", ".join(f"{name} {self.rows[i][column_of(name)]}" for name in names)
+            key = ", ".join(f"{name} {value_text(name, self.rows[i])}" for name in names)
             curves.setdefault(key, []).append(i)
         return curves
 
@@ -135,6 +135,15 @@ def axis_of(name: str, values: np.ndarray) -> tuple[str, float]:
     words, size = quantity_of(name)
     size, factor = suitable_unit(size, values)
     return f"{words} [{size}]" if size else words, factor
+
+
+def value_text(name: str, row: Row) -> str:
+    """The value of a varied name in a row, with its unit."""
+    text = row[column_of(name)]
+    if not is_number(text):
+        return text
+    size, factor = suitable_unit(quantity_of(name)[1], np.array([float(text)]))
+    return f"{float(text) * factor:.6g} {size}".rstrip(" -")
 
 
 def heading(case: Case, plan: Plan, number: int) -> str:

@@ -615,8 +615,8 @@ class Search:
             top, limit_point = failing.points[failing.top], failing.points[failing.limit_point]
             ratio = failing.points[-1].imposed / failing.imposed(limit_point)
             why = (
-                f"the equilibrium path, followed to {ratio:.2g} times that displacement, reaches "
-                f"{top.level:.6g} m at most"
+                f"the equilibrium path reaches {top.level:.6g} m at most (followed to {ratio:.2g} "
+                "times the displacement of that level)"
             )
             reached = bound(last_state(self, top))
             if reached.mode:

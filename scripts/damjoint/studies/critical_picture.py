@@ -131,15 +131,20 @@ def figure_of(content: Content) -> Figure:
     return figure
 
 
+def crest_level(case: Case) -> float:
+    """Level of the crest [m]."""
+    if geometry := case.geometry and mesh_of(case).user_geometry:
+        return float(geometry.concrete[:, 1].max())
+    return float(case["dam_height"])
+
+
 def draw_levels(axes: Axes, content: Content) -> None:
     """Draw the required level and the crest."""
     if content.of != "level":
         level = max(content.case.levels)
         label = f"required level {level:.5g} m"
         axes.axhline(level, color=WATER, linewidth=0.9, label=label)
-    crest = content.case["dam_height"]
-    if geometry := content.case.geometry and mesh_of(content.case).user_geometry:
-        crest = geometry.concrete[:, 1].max()
+    crest = crest_level(content.case)
     axes.axhline(crest, color=GREY, linestyle="-.", lw=0.9, label=f"crest {crest:.5g} m")
 
 

@@ -22,7 +22,7 @@ from ..post.field_files import write_fields
 from ..post.tables import write_csv
 from ..runner import early_end
 from ..session import Session, preparation, session, study_end
-from ..solver.path import Point
+from ..solver.path import PRECISION, Point
 from ..statics.hints import tension_share
 from ..statics.statement import statement
 from . import critical_picture as picture
@@ -119,6 +119,12 @@ def printed_lines(answer: CriticalValue, search: Search) -> list[str]:
             lines = [critical + mode, answer.why]
         else:
             lines = [f"{critical}, not confirmed: {answer.doubt}{mode}"]
+    if of == "level" and answer.value is not None:
+        crest = picture.crest_level(search.case)
+        if (depth := answer.value - crest) > PRECISION * crest:
+            lines.append(
+                f"the crest, at {crest:.6g} m, is overtopped: {depth:.3g} m of water above it"
+            )
     lines += [*growth_lines(answer), *answer.events]
     if search.of == "strength" and set(search.partial.values()) != {1.0}:
         mu, cohesion = search.partial["mu"], search.partial["adhesion"]
