@@ -16,8 +16,9 @@ from ..input.case import Case
 from ..input.resolve import varied
 from ..joint.interface import interface_of
 from ..model.results import Results, history_columns
-from ..solver.derivatives import Differentiation, SidesInStep
+from ..solver.derivatives import Differentiation
 from ..solver.load_stepper import LoadStepper
+from ..solver.sides import SidesInStep
 
 #: Columns of the file besides those that are measured: of the reservoir and the tailwater [m above
 #: the heel], and a text that is only copied.

@@ -25,12 +25,12 @@ from ..solver.derivatives import (
     Differentiation,
     Rates,
     Side,
-    SidesInStep,
     half_difference,
     history_row,
 )
 from ..solver.load_stepper import SAME_TIME, LoadStepper
 from ..solver.path import Point
+from ..solver.sides import SidesInStep
 from ..statics.gravity import factors_of_state, with_crack
 from ..threads import limited_threads
 from ..units import with_slash
