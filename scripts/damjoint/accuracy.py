@@ -118,13 +118,13 @@ def solve(case: Case, engine: Engine, on_step: OnStep, fields: bool) -> Iterator
     Adds `error_estimate` to the content of run.json. Raises RunError.
     """
     if not case.accuracy:
-        yield from engine.solve(case, on_step, fields)
+        yield from engine(case, on_step, fields)
         return
     for number, scene in enumerate(case.scenes()):
 
         def solve_mesh(meshed: Case, number: int = number) -> Outcome:
             outcomes: Iterator[Outcome]
-            outcomes = engine.solve(meshed, lambda _, now: on_step(number, now), fields)
+            outcomes = engine(meshed, lambda _, now: on_step(number, now), fields)
             return next(outcomes)
 
         yield refine_until_accurate(replace(scene, also_uplift=()), case.accuracy, solve_mesh)

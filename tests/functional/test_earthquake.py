@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from damjoint import InputError, RunError
-from damjoint.engines import engine_of
+from damjoint.engines import check_engine
 from damjoint.input.resolve import load
 from damjoint.statics import gravity
 from numpy.testing import assert_allclose
@@ -105,7 +105,7 @@ def test_what_the_reference_model_and_own_meshes_do_not_have():
     case = load("dam", {"uplift": "cracked", "quake_uplift": "zero", "k_h": 0.1})
     try:
         with pytest.raises(InputError, match="quake_uplift = zero: must be crack"):
-            engine_of(case, "getdp")
+            check_engine(case, "getdp")
     except RunError:
         pytest.skip("no GetDP")
     with pytest.raises(InputError, match="added_mass = 2: must be 0 or 1 with a geometry"):

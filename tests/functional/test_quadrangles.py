@@ -83,7 +83,7 @@ def test_both_engines_agree_on_quadrangles_beside_triangles(blocks):
     """
     settings = {"mesh_pattern": "regular", "n_joint": 5, "uplift": "imposed", "nu": 0.2, "order": 2}
     case, nothing = load(blocks, settings), lambda number, time: None
-    (one,), (other,) = (engine_of(case, n).solve(case, nothing, True) for n in ("getdp", "auto"))
+    (one,), (other,) = (engine_of(case, n)(case, nothing, True) for n in ("getdp", "auto"))
     assert max(differences(one.result, other.result)) < 1e-6
     assert len({shape for shape, _ in one.mesh().bodies["foundation"].cells}) == 2
     for a, b in zip(one.fields().values(), other.fields().values(), strict=True):

@@ -42,14 +42,14 @@ def call(arguments: argparse.Namespace) -> int:
     from ..studies.critical_study import critical
 
     case = load_case(arguments, arguments.case)
-    names, of_names = list[str](), deviations(arguments)
+    names, uncertain = list[str](), deviations(arguments)
     if arguments.sensitivity:
         from ..studies.sensitivity import names_of
 
         if arguments.of != "level":
             raise InputError(f"--sensitivity: needs --of level, not --of {arguments.of}")
-        names = names_of(case, arguments.sensitivity, uncertain=of_names)
-    answer, lines = critical(case, arguments.of, arguments.out, names, of_names)
+        names = names_of(case, arguments.sensitivity, uncertain=uncertain)
+    answer, lines = critical(case, arguments.of, arguments.out, names, uncertain)
     say("\n".join(lines))
     if answer.value is None:
         return NONE

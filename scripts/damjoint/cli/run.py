@@ -59,12 +59,12 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
     out = arguments.out or Path("out") / case.name
     fields, picture = not arguments.no_fields, drawing is not None
     code, options = 0, dict[str, Any]()
-    of_names = deviations(arguments)
+    uncertain = deviations(arguments)
     if arguments.sensitivity:
         from ..studies import sensitivity
 
-        names = sensitivity.names_of(case, arguments.sensitivity, True, of_names)
-        options["further"] = partial(sensitivity.write, names, picture, deviations=of_names)
+        names = sensitivity.names_of(case, arguments.sensitivity, True, uncertain)
+        options["further"] = partial(sensitivity.write, names, picture, deviations=uncertain)
         options["stage"] = sensitivity.STAGE
     options |= {"engine": arguments.engine, "drawing": drawing}
 

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 from .. import InputError
@@ -40,16 +41,12 @@ class Outcome:
     error: BaseException | None = None
 
 
-@dataclass(frozen=True)
-class Engine:
-    """What solves a case, see above."""
-
-    solve: Callable[[Case, OnStep, bool], Iterator[Outcome]]
+#: The function `solve` of an engine.
+Engine = Callable[[Case, OnStep, bool], Iterator[Outcome]]
 
 
-def engine_of(case: Case, name: str, allowed: Sequence[str] = ENGINES) -> Engine:
-    """The engine of a name: condensed; iterative, the same with its bodies uncondensed, in 3D;
-    auto, the one of these that suits the size of the case; or getdp, the reference GetDP model.
+def check_engine(case: Case, name: str = "auto", allowed: Sequence[str] = ENGINES) -> ModuleType:
+    """The module of the engine of a name.
 
     Raises InputError if there is none, or if it can not run the case.
     """
@@ -57,7 +54,17 @@ def engine_of(case: Case, name: str, allowed: Sequence[str] = ENGINES) -> Engine
         raise InputError(f"engine = {name}: must be one of {', '.join(allowed)}")
     if name == "iterative" and case["dim"] == 2:
         raise InputError("engine = iterative: must be auto, condensed or getdp with dim = 2")
-    module = "getdp" if name == "getdp" else "condensed"
-    engine = import_module(f".{module}.solve", __name__)
-    engine.check(case)
-    return Engine(engine.solve if name == "getdp" else partial(engine.solve, engine=name))
+    package = "getdp" if name == "getdp" else "condensed"
+    module = import_module(f".{package}.solve", __name__)
+    module.check(case)
+    return module
+
+
+def engine_of(case: Case, name: str) -> Engine:
+    """The engine of a name: condensed; iterative, the same with its bodies uncondensed, in 3D;
+    auto, the one of these that suits the size of the case; or getdp, the reference GetDP model.
+
+    Raises InputError, see `check_engine`.
+    """
+    module = check_engine(case, name)
+    return module.solve if name == "getdp" else partial(module.solve, engine=name)

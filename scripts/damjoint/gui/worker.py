@@ -19,7 +19,6 @@ from types import FrameType
 from typing import Any, TypeAlias
 
 from .. import InputError, accuracy
-from ..engines import Engine
 from ..engines.condensed import solve as engine
 from ..fem.factor import single_thread
 from ..input.case import Case
@@ -127,7 +126,7 @@ def run_case(sheet: Sheet, pipe: Connection, stop: Stop) -> tuple[list[SolvedSce
         stop.after_step()
 
     with stop:
-        for outcome in accuracy.solve(case, Engine(engine.solve), on_step, True):
+        for outcome in accuracy.solve(case, engine.solve, on_step, True):
             outcomes.append(outcome)
             if outcome.error:
                 break

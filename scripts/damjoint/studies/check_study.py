@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import InputError
-from ..engines import engine_of
+from ..engines import check_engine
 from ..input.case import Case
 from ..model.results import Results
 from ..pictures.check_picture import Content, draw_check
@@ -46,7 +46,7 @@ def check_cases(
             sensitivity.names_of(case, derivatives, True, deviations or ())
         if names.count(case.name) > 1:
             raise InputError(f"case {case.name}: must be given once, and have its own name")
-        engine_of(case, "auto")
+        check_engine(case)
     also = derivatives, dict(deviations or {})
     tasks, checks = {out / case.name: (case, out / case.name, *also) for case in cases}, []
     for of_cases in several(check_case, tasks, out, jobs, "check"):

@@ -18,7 +18,7 @@ from scipy.optimize import bisect
 
 from .. import InputError, meant
 from ..arrays import Setting
-from ..engines import engine_of
+from ..engines import check_engine
 from ..input.case import Case
 from ..input.parameters import declared, independent, parameter
 from ..input.resolve import resolve, varied
@@ -143,7 +143,7 @@ class Search:
     def check_quantity(self) -> None:
         """Raise InputError if the case has nothing to vary, or no engine can compute it."""
         case = self.case
-        engine_of(case, "auto")
+        check_engine(case)
         if case.stores_water:
             raise InputError(
                 f"time_unit = {case['time_unit']:g}: must be 0 in the search of a critical value, "

@@ -13,7 +13,7 @@ import numpy as np
 from .. import InputError
 from ..arrays import Value
 from ..dynamics.checkpoint import fingerprint
-from ..engines import engine_of
+from ..engines import check_engine
 from ..engines.getdp import quake as getdp_quake
 from ..input.case import Case
 from ..model.fields import Solution
@@ -77,7 +77,7 @@ class Ended:
 
 def check(case: Case, options: Options) -> None:
     """Raise InputError if the earthquake of a case can not be computed so."""
-    engine_of(case, options.engine, ("auto", "condensed", "getdp"))
+    check_engine(case, options.engine, ("auto", "condensed", "getdp"))
     quake.check(case, options.span)
     if options.engine == "getdp":
         if options.fields:

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 from .. import InputError, RunError, accuracy, runner
 from ..arrays import Value, Values
 from ..dynamics import record_files
-from ..engines import engine_of
+from ..engines import check_engine
 from ..input.case import Case
 from ..input.refinement import first_mesh
 from ..input.resolve import equal_steps, resolve, with_drive_times
@@ -214,7 +214,7 @@ def planned(case: Case, plan: Plan) -> Iterator[tuple[str, Values, Task]]:
         if plan.quake:
             quake.check(varied)
         if varied.geometry and varied.stores_water:
-            engine_of(varied, "auto")  # checks the paths of the water
+            check_engine(varied)  # checks the paths of the water
         task = Task(varied, bool(plan.sampled), search, plan.critical_columns, plan.quake)
         yield row_key(varied, plan), row, task
 
