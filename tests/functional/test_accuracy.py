@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from damjoint import RunError, accuracy
-from damjoint.engines.condensed import solve as condensed
+from damjoint.engines.condensed.solve import solve as condensed
 from damjoint.input.resolve import load
 
 #: A dam of ordinary stiffness that slips and opens at its heel.
@@ -111,10 +111,10 @@ class Limited:
     def __init__(self, most, what):
         self.most, self.what = most, what
 
-    def solve(self, case, on_step, fields):
+    def __call__(self, case, on_step, fields):
         if case["n_joint"] > self.most:
             raise self.what
-        yield from condensed.solve(case, on_step, fields)
+        yield from condensed(case, on_step, fields)
 
 
 def test_if_memory_is_exceeded_the_results_of_the_mesh_before_are_returned():
