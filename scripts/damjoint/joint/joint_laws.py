@@ -133,6 +133,8 @@ class JointLaws:
                 self.laws, variables.split(jump), variables.joints, inside, strict=True
             )
         ]
+        if len(parts) == 1:
+            return parts[0]
         traction, tangent = (np.concatenate(values) for values in zip(*parts, strict=True))
         return traction, tangent
 

@@ -46,6 +46,8 @@ class Trial(NamedTuple):
     size: Array
     direction: Array
     slip: Array
+    #: whether the point is open
+    open: BoolArray
 
 
 class Friction(Law[FrictionVariables]):
@@ -108,22 +110,25 @@ class Friction(Law[FrictionVariables]):
 
     def trial(self, jump: Array, variables: FrictionVariables) -> Trial:
         """The elastic predictor and the slip that returns it to the yield surface."""
-        normal = self.K_N * np.minimum(self.opening(jump, variables), self.cap_opening)
+        opening = self.opening(jump, variables)
+        normal = self.K_N * np.minimum(opening, self.cap_opening)
         shear = self.K_T * (jump[:, 1:] - variables.plastic)
-        size = np.linalg.norm(shear, axis=1)
+        size = np.sqrt(shear[:, 0] ** 2 + shear[:, 1] ** 2)
         excess = size + self.mu * normal - self.H * variables.accumulated - self.adhesion
         direction = shear / np.maximum(size, 1e-300)[:, None]
         slips = excess > self.yield_tolerance * size
-        return Trial(normal, size, direction, np.where(slips, excess / (self.K_T + self.H), 0))
+        slip = np.where(slips, excess / (self.K_T + self.H), 0)
+        return Trial(normal, size, direction, slip, opening > self.cap_opening)
 
     def traction_and_tangent(
         self, jump: Array, variables: FrictionVariables
     ) -> tuple[Array, Array]:
         """See `Law`; the tangent is not symmetric."""
-        normal, size, n, slip = self.trial(jump, variables)
-        traction = np.column_stack([normal, (size - self.K_T * slip)[:, None] * n])
+        normal, size, n, slip, opened = self.trial(jump, variables)
+        traction = np.empty((len(jump), 3))
+        traction[:, 0], traction[:, 1:] = normal, (size - self.K_T * slip)[:, None] * n
         tangent = np.zeros((len(jump), 3, 3))
-        tangent[:, 0, 0] = self.normal_stiffness(jump, variables)
+        tangent[:, 0, 0] = self.normal_stiffness(opened)
         tangent[:, 1, 1] = tangent[:, 2, 2] = self.K_T
         slides = np.flatnonzero(slip)
         if not len(slides):
@@ -136,22 +141,21 @@ class Friction(Law[FrictionVariables]):
             across[:, None, None] * (eye - outer) + along * outer + self.artificial * eye
         )
         coupling = -self.K_T / (self.K_T + self.H) * self.mu * self.K_N
-        closed = ~self.is_open(jump, variables)[slides]
-        tangent[slides, 1:, 0] = np.where(closed, coupling, 0)[:, None] * n
+        tangent[slides, 1:, 0] = np.where(opened[slides], 0, coupling)[:, None] * n
         return traction, tangent
 
     def secant_stiffness(self, jump: Array, variables: FrictionVariables) -> Array:
         """See `Law`: stress over jump, without coupling."""
-        _, size, _, slip = self.trial(jump, variables)
+        _, size, _, slip, opened = self.trial(jump, variables)
         matrix = np.zeros((len(jump), 3, 3))
         share = np.where(slip > 0, 1 - self.K_T * slip / np.maximum(size, 1e-300), 1.0)
-        matrix[:, 0, 0] = self.normal_stiffness(jump, variables)
+        matrix[:, 0, 0] = self.normal_stiffness(opened)
         matrix[:, 1, 1] = matrix[:, 2, 2] = self.K_T * np.maximum(share, self.artificial)
         return matrix
 
-    def normal_stiffness(self, jump: Array, variables: FrictionVariables) -> Array:
+    def normal_stiffness(self, opened: BoolArray) -> Array:
         """K_N, next to nothing where the point is open (q,)."""
-        return np.where(self.is_open(jump, variables), self.artificial * self.K_N, self.K_N)
+        return np.where(opened, self.artificial * self.K_N, self.K_N)
 
     # -- meaning
 
