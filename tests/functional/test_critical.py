@@ -25,7 +25,7 @@ from damjoint.solver import path
 from damjoint.solver.path import FALL
 from damjoint.statics import gravity
 from damjoint.statics.verdict import highest_by_statics, verdict
-from damjoint.studies import failure_path
+from damjoint.studies import critical_value, failure_path
 from damjoint.studies.critical import Search
 from damjoint.studies.critical_study import critical, printed_lines, table
 from damjoint.studies.failure_path import FailurePath
@@ -285,6 +285,24 @@ def test_a_limit_without_a_mechanism_is_not_confirmed(monkeypatch, command):
     code, out, _ = command("critical", "c", "--set", "pena_tang=0", "--levels", "6,8")
     # the interval has the highest levels of all three repetitions
     assert code == 3 and "critical level 6 m, not confirmed: between 6 and 6.625 m" in out
+
+
+def test_the_end_of_a_branch_above_which_a_run_stands_is_not_confirmed(monkeypatch):
+    """Random dam 162-5: no increment leads on where a stiff joint opens, whose shear is released at
+    once; 10.15 m was confirmed, while runs stand at 10.8 m.
+    """
+    advance = FailurePath.advance_branch
+    monkeypatch.setattr(
+        FailurePath, "advance_branch", lambda self: self.points[-1].level < 5 and advance(self)
+    )
+    ends = lambda self, last: vars(self).update(ended=True)
+    monkeypatch.setattr(FailurePath, "pass_over", ends)
+    monkeypatch.setattr(FailurePath, "repeated", lambda self: None)
+    _, answer = search_result("c", settings={"pena_tang": 0.0}, levels="3,4")
+    assert answer.growth == answer.value < 5.1 and not answer.confirmed
+    level = (1 + critical_value.AFTER_GROWTH) * answer.value
+    assert answer.after == {"by a run": pytest.approx(level)}
+    assert f"but a run stands at {level:.6g} m" in answer.doubt
 
 
 @pytest.mark.parametrize(

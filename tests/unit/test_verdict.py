@@ -128,6 +128,8 @@ def test_the_statement_gives_the_mechanism_found_on_the_path():
     statement = statement_of(result)
     assert statement.startswith("sliding: no equilibrium beyond level 2 m")
     assert "2.5 m at most (followed to 4.2 times the displacement of that level)" in statement
+    result.info["mechanism"]["level"] = 2.0001  # the path's limit point is its last state
+    assert "no equilibrium beyond level 2.0001 m" in statement_of(result)
 
 
 def test_a_statement_after_unstable_crack_growth_names_its_lowest_level():

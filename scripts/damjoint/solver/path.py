@@ -151,7 +151,7 @@ SHORTER = 4
 #: A path whose level falls below this part of its highest one is not followed farther: the joints
 #: hold no water any more.
 STRENGTH_LOST = 0.01
-#: Most equilibria on a path.
+#: Most equilibria on a path by increments of the usual rise; by shorter ones as many more.
 MOST_POINTS = 800
 
 
@@ -488,8 +488,12 @@ class EquilibriumPath:
     @property
     def exhausted(self) -> bool:
         """Whether it has as many points as a path may have, or the strength is lost."""
-        lost = self.points[-1].level < STRENGTH_LOST * self.highest
-        return lost or len(self.points) >= MOST_POINTS
+        return self.unfinished or self.points[-1].level < STRENGTH_LOST * self.highest
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether it has as many points as a path may have."""
+        return len(self.points) >= MOST_POINTS * max(1.0, RISE / self.rise)
 
     def add(self, point: Point) -> None:
         """Append an equilibrium."""

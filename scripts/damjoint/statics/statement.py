@@ -9,6 +9,7 @@ from ..input.case import Case
 from ..input.constraints import STAGED
 from ..input.values import has_drains, level_unknown
 from ..model.results import Results
+from ..solver.path import PRECISION
 from ..units import FORCES, STRESSES, with_unit
 from . import gravity
 from .verdict import STIFF_JOINT, Bound, bound, failure, slipped_from, stiffness_ratio, verdict
@@ -27,7 +28,7 @@ def statement(results: Results) -> str:
     if not last:
         return reason_at_first(results, mode)
     if results.stopped:
-        where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
+        where = f"level {highest_level(results):.6g} m (t = {last['time']:.6g})"
         if mode == "out of range":
             return (
                 f"out of range: the displacement needs a level below 0 or above "
@@ -66,7 +67,7 @@ def reason_of_stop(results: Results) -> str:
     state after unstable crack growth, and so its strength, depends on steps and mesh.
     """
     case, last, shown = results.case, results.last, results.info.get("mechanism")
-    where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
+    where = f"level {highest_level(results):.6g} m (t = {last['time']:.6g})"
     if grown := results.info.get("unstable_growth"):
         where += f", after unstable crack growth at level {min(grown):.6g} m"
     if shown:
@@ -89,6 +90,15 @@ def reason_of_stop(results: Results) -> str:
         + (f"{end}; " if end else "")
         + f"there the resultant is {arm:.3g} m from the toe, T/N' = {last['T'] / last['N']:.3g}"
     )
+
+
+def highest_level(results: Results) -> float:
+    """The last level [m], or the highest of the equilibrium path where the last state is its limit
+    point: the same to the precision.
+    """
+    level, shown = float(results.last["level"]), results.info.get("mechanism")
+    most = shown["level"] if shown else level
+    return most if level < most <= (1 + PRECISION) * level else level
 
 
 def words_of_bound(reached: Bound) -> str:

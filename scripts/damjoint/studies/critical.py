@@ -25,13 +25,14 @@ from ..input.resolve import resolve, varied
 from ..joint.interface import interface_of
 from ..model.results import Results, row_of_joint
 from ..session import study_end
+from ..solver.load_stepper import LoadStepper
 from ..solver.path import FALL, PRECISION, RISE, ROUGH, SURE, Point
 from ..statics.statement import REASONS, words_of_bound
 from ..statics.verdict import bound, highest_by_statics
 from ..threads import limited_threads
 from ..units import FORCES, STRESSES, with_unit
 from .critical_gravity import GravityValues
-from .critical_value import CriticalValue
+from .critical_value import AFTER_GROWTH, CriticalValue
 from .critical_words import (
     beyond_limit,
     by_increments,
@@ -41,6 +42,7 @@ from .critical_words import (
     falls_at_once,
     lost_beyond_limit,
     slips_whole,
+    stands_beyond,
     withdrawn,
 )
 from .failure_path import FailurePath, Trial
@@ -76,6 +78,13 @@ FALL_FACTOR = 1.35
 
 #: How unstable crack growth is passed over: whether by relaxation.
 AFTER = {"by displacement": False, "by relaxation": True}
+
+#: The mode of a level at which a crack grows unstably, and beyond which there are equilibria.
+GROWTH = "unstable crack growth"
+
+#: Relative distance from the end of a branch to the level above it that a run must not reach: up
+#: to it, highest levels after unstable growth are the same.
+ABOVE = AFTER_GROWTH
 
 #: Relative distance within which the bound of statics confirms a critical level below it.
 NEAR_BOUND = 0.02
@@ -283,20 +292,15 @@ class Search:
         path = self.path(max(case.levels), case, case.highest_level, to_growth=True)
         paths = list[FailurePath]()
         for _ in range(MOST_REPEATED):
-            path.refine()  # first: a limit point that is known is confirmed sooner
-            path.follow(SURE)
-            grows = path.to_growth and (path.grows or path.ends)
-            if grows and path.starts:
-                path = path.first_branch()
-            path.refine()
+            path, grows = finished(path)
             other = None if path.reached else self.repeated(path)
             paths += [path, *([other] if other else [])]
             certain, path = other is None, other or path
             if certain:
                 break
         else:  # the lowest of their levels, on the safe side
-            path = min(paths, key=lambda path: path.highest)
-            grows = path.to_growth and (path.grows or path.ends)
+            complete = [path for path in paths if not path.unfinished] or paths
+            path, grows = finished(min(complete, key=lambda path: path.highest))
         if path.reached:
             beyond = f"{path.target:g} m, twice the dam's height"
             return CriticalValue(
@@ -304,26 +308,30 @@ class Search:
             )
         whole = path if repeats_whole(path) else None
         point = path.points[path.top] if path.admissible else None
-        after, ends = dict[str, float](), grows and path.ended
+        first, after, ends = path, dict[str, float](), grows and path.ended
         if point and grows:
-            first, (after, path) = path, self.after_growth(path)
-            # the growth of a single point may be passed over
-            if certain and (after or first.releases_shear):
-                other = self.otherwise(first, ways_over_growth(first, whole is first))
-                certain = other is None
+            after, path = self.after_growth(first)
         result = self.result(point.level if point else None, path, point)
         if point is None:
             return result
         if after or ends:
-            mode = "unstable crack growth" if after else result.mode
+            mode = GROWTH if after else result.mode
             result = replace(result, mode=mode, why=beyond_limit(path), doubt="", after=after)
             result = replace(result, growth=point.level)
+            if not after and path.top + 1 == len(path.points):
+                result = self.with_run(path, result)
+            ways = list[Way]()
         else:
             ways = further_ways(path, whole is path, mechanism=bool(result.why))
-            result = result if result.why else with_end_of(path, result)
-            if result.why and certain:
-                other = self.otherwise(path, ways)
-                certain = other is None
+            result = result if result.why else self.with_end_of(path, result)
+        checks = [(path, ways)] if result.why and not result.after else []
+        # the growth of a single point may be passed over
+        if (result.why and result.after) or (grows and first.releases_shear):
+            checks = [(first, ways_over_growth(first, whole is first)), *checks]
+        if certain:
+            others = (self.otherwise(*check) for check in checks)
+            other = next(filter(None, others), None)
+            certain = other is None
         if path.begun_by_run and point is path.points[0]:
             result = replace(result, why="", doubt=falls_at_once(point))
         if path.water_withdraws:
@@ -635,8 +643,41 @@ class Search:
         result = self.result(value, failing, point)
         if result.why or any(start <= failing.top for start in failing.starts):
             return result
-        ended = with_end_of(failing, result)
+        ended = self.with_end_of(failing, result)
         return ended if ended.why and self.repeated(failing) is None else result
+
+    def with_end_of(self, path: FailurePath, result: CriticalValue) -> CriticalValue:
+        """A result that no mechanism confirms, with what the end of its path says."""
+        if path.ends_at_strength:
+            return replace(result, mode="sliding", why=slips_whole(path), doubt="")
+        if path.falls:
+            return replace(result, why=lost_beyond_limit(path), doubt="")
+        if path.branch_ends:
+            return self.with_run(path, replace(result, why=end_of_branch(path), doubt=""))
+        return result
+
+    def with_run(self, path: FailurePath, result: CriticalValue) -> CriticalValue:
+        """A result that rests on the end of a branch alone, with a run to a level above it (for
+        another quantity than the level, to the target). Where the run stands, there are equilibria
+        beyond: the branch has ended in unstable growth, or is not the highest one.
+        """
+        level = path.target
+        if self.of == "level":
+            level = min((1 + ABOVE) * path.highest, level)
+        run = run_to(path, level)
+        if run.stopped:
+            comes_near = run.state.loading.level > (1 - ABOVE) * path.highest
+            near_drains = path.loses_drains and not comes_near
+            return replace(result, why="", doubt=end_at_drains(path)) if near_drains else result
+        known = path.interval[1] > level  # from a path by other increments
+        result = replace(
+            result, why="", doubt=by_increments(path) if known else stands_beyond(level)
+        )
+        if self.of != "level":
+            return result
+        if path.to_growth:
+            result = replace(result, mode=GROWTH, why=stands_beyond(level), doubt="")
+        return replace(result, growth=path.highest, after={"by a run": float(level)})
 
     def by_statics(self, failing: FailurePath) -> tuple[str, str, str]:
         """How an unconfirmed path fails, why, and at which joint, if there are several: its
@@ -654,23 +695,38 @@ class Search:
         return mode, why, joint
 
 
-def with_end_of(path: FailurePath, result: CriticalValue) -> CriticalValue:
-    """A result that no mechanism confirms, with what the end of its path says."""
-    if path.ends_at_strength:
-        return replace(result, mode="sliding", why=slips_whole(path), doubt="")
-    if path.falls:
-        return replace(result, why=lost_beyond_limit(path), doubt="")
-    if path.stops and path.loses_drains:
-        return replace(result, doubt=end_at_drains(path))
-    return replace(result, why=end_of_branch(path), doubt="") if path.branch_ends else result
+def finished(path: FailurePath) -> tuple[FailurePath, bool]:
+    """A path followed to its end, or only its first branch where that ends in unstable growth, with
+    its highest level; and whether it does.
+    """
+    path.refine()  # first: a limit point that is known is confirmed sooner
+    path.follow(SURE)
+    grows = path.to_growth and (path.grows or path.ends)
+    if grows and path.starts:
+        path = path.first_branch()
+    path.refine()
+    return path, grows
+
+
+def run_to(path: FailurePath, level: float) -> LoadStepper:
+    """A run from the beginning of a path to a level [m], by all strategies of a run."""
+    case, solver = path.case, path.solver
+    levels, tails = tuple(min(known, level) for known in case.levels), case.tail_levels
+    if levels[-1] < level:
+        levels, tails = (*levels, level), (*tails, tails[-1])
+    run = LoadStepper(varied(case, {}, levels, tails).with_values(solver), path.interface)
+    for _ in run.steps():
+        pass
+    return run
 
 
 def repeats_whole(path: FailurePath) -> bool:
     """Whether a path is repeated from its beginning on: where the level is that after the end of a
-    branch, or water enters the crack and no mechanism is found.
+    branch, or water enters the crack and no mechanism is found, or its points lose cohesion one by
+    one all the way.
     """
     lost = path.entering and (path.stops or path.water_withdraws)
-    return lost or bool(path.starts and path.top >= path.starts[0])
+    return lost or path.loses_cohesion or bool(path.starts and path.top >= path.starts[0])
 
 
 def ways_over_growth(path: FailurePath, repeated: bool) -> list[Way]:

@@ -28,11 +28,8 @@ from ..statics.statement import statement
 from . import critical_picture as picture
 from . import sensitivity as sensitivities
 from .critical import Search, last_state
-from .critical_value import CriticalValue
+from .critical_value import AFTER_GROWTH, CriticalValue
 from .failure_path import critical_columns, row
-
-#: Relative difference up to which the levels agree that are reached after unstable crack growth.
-AFTER_GROWTH = 1e-3
 
 
 def critical(

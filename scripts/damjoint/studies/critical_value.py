@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 
 from ..solver.path import Point
 
+#: Relative difference up to which the levels agree that are reached after unstable crack growth.
+AFTER_GROWTH = 1e-3
+
 
 @dataclass(frozen=True)
 class CriticalValue:

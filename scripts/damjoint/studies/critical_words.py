@@ -47,6 +47,15 @@ def end_of_branch(path: FailurePath) -> str:
     )
 
 
+def stands_beyond(level: float) -> str:
+    """What is said of the end of a branch above which a run stands at a level [m]."""
+    return (
+        "there the branch of equilibria ends: no increment of the crest, of the joints or of the "
+        f"process zone, however short, leads on; but a run stands at {level:.6g} m, on another "
+        "branch"
+    )
+
+
 def end_at_drains(path: FailurePath) -> str:
     """What is said of a path that ends where a crack may take the effect of drains."""
     return (

@@ -103,6 +103,15 @@ class FailurePath(EquilibriumPath):
         #: whether water enters the crack element by element, at each of which the level falls
         self.entering = any(joint["uplift"] == "cracked" for joint in case.joints)
         brittle = any(law.softens and law.tensile_strength > 0 for law in laws.laws)
+        #: whether a joint without tension slips point by point before it slips whole, each of which
+        #: loses its cohesion: the increments all the way decide which points are left
+        none = np.zeros(1)
+        self.loses_cohesion = any(
+            law.softens
+            and not law.tensile_strength
+            and 0 < float(law.shear_strength(none, none, none)[0]) < np.inf
+            for law in laws.laws
+        )
         self.releases_shear = laws.releases_shear
         self.to_growth = to_growth and (self.releases_shear or (brittle and not self.entering))
         # after a step of the weight alone steps can be halved; else the first includes the weight
@@ -198,7 +207,7 @@ class FailurePath(EquilibriumPath):
     @property
     def branch_ends(self) -> bool:
         """Whether nothing is known of its end but that no increment, however short, leads on."""
-        known = self.ends_at_strength or self.falls or self.loses_drains
+        known = self.ends_at_strength or self.falls
         return self.stops and not known
 
     @property
