@@ -482,7 +482,7 @@ class EquilibriumPath:
     @property
     def stops(self) -> bool:
         """Whether increments have led to its highest level, and none leads on."""
-        stops = self.ended and not self.exhausted and bool(self.points)
+        stops = bool(self.points) and self.ended and not self.exhausted
         return stops and self.points[self.top].control != "level"
 
     @property
