@@ -301,7 +301,7 @@ def test_the_end_of_a_branch_above_which_a_run_stands_is_not_confirmed(monkeypat
     _, answer = search_result("c", settings={"pena_tang": 0.0}, levels="3,4")
     assert answer.growth == answer.value < 5.1 and not answer.confirmed
     level = (1 + critical_value.AFTER_GROWTH) * answer.value
-    assert answer.after == {"by a run": pytest.approx(level)}
+    assert answer.after == {critical_value.BY_RUN: pytest.approx(level)}
     assert f"but a run stands at {level:.6g} m" in answer.doubt
 
 

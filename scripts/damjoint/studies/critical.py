@@ -32,7 +32,7 @@ from ..statics.verdict import bound, highest_by_statics
 from ..threads import limited_threads
 from ..units import FORCES, STRESSES, with_unit
 from .critical_gravity import GravityValues
-from .critical_value import AFTER_GROWTH, CriticalValue
+from .critical_value import AFTER_GROWTH, BY_RUN, CriticalValue
 from .critical_words import (
     beyond_limit,
     by_increments,
@@ -677,7 +677,7 @@ class Search:
             return result
         if path.to_growth:
             result = replace(result, mode=GROWTH, why=stands_beyond(level), doubt="")
-        return replace(result, growth=path.highest, after={"by a run": float(level)})
+        return replace(result, growth=path.highest, after={BY_RUN: float(level)})
 
     def by_statics(self, failing: FailurePath) -> tuple[str, str, str]:
         """How an unconfirmed path fails, why, and at which joint, if there are several: its

@@ -28,7 +28,7 @@ from ..statics.statement import statement
 from . import critical_picture as picture
 from . import sensitivity as sensitivities
 from .critical import Search, last_state
-from .critical_value import AFTER_GROWTH, CriticalValue
+from .critical_value import AFTER_GROWTH, BY_RUN, CriticalValue
 from .failure_path import critical_columns, row
 
 
@@ -151,7 +151,9 @@ def growth_lines(answer: CriticalValue) -> list[str]:
     if answer.growth is None:
         return []
     lines = [f"first unstable crack growth: {answer.growth:.6g} m"]
-    if answer.after:
+    if BY_RUN in answer.after:
+        lines.append(f"after it, not confirmed: {BY_RUN} {answer.after[BY_RUN]:.6g} m")
+    elif answer.after:
         low, high = min(answer.after.values()), max(answer.after.values())
         ways = "; ".join(f"{level:.6g} m {name}" for name, level in answer.after.items())
         agree = len(answer.after) > 1 and high - low <= AFTER_GROWTH * high

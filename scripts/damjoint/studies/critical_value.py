@@ -9,6 +9,8 @@ from ..solver.path import Point
 
 #: Relative difference up to which the levels agree that are reached after unstable crack growth.
 AFTER_GROWTH = 1e-3
+#: Name of a level after it at which a run stands, among those that are reached.
+BY_RUN = "a run stands at"
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ def stands_beyond(level: float) -> str:
     return (
         "there the branch of equilibria ends: no increment of the crest, of the joints or of the "
         f"process zone, however short, leads on; but a run stands at {level:.6g} m, on another "
-        "branch"
+        "branch, where the state may depend on its steps"
     )
 
 
@@ -66,10 +66,15 @@ def end_at_drains(path: FailurePath) -> str:
 
 def withdrawn(path: FailurePath) -> str:
     """What is said of a path on which the water leaves the crack."""
+    last = path.points[path.counted - 1].level
+    falls = last < (1 - path.unstable_fall) * path.highest
+    begin = (
+        f"there the level falls to {last:.6g} m, from where on" if falls else f"above {last:.6g} m"
+    )
     return (
-        f"above {path.points[path.counted - 1].level:.6g} m points of the crack close again and "
-        "part its water from the reservoir: the equilibria beyond it have less uplift than an "
-        "open crack, and no path leads on at a level just above the highest one"
+        f"{begin} points of the crack close again and part its water from the reservoir: the "
+        "equilibria beyond it have less uplift than an open crack, and no path leads on at a level "
+        "just above the highest one"
     )
 
 
