@@ -122,6 +122,12 @@ SNAP_BACK = {
     "drive_energy": 3000.0,
 }
 
+SOLID = {"dim": 3.0, "thickness": 5.0, "n_layers": 1.0, "order": 1.0, "n_joint": 6.0}
+#: A force at the crest that breaks the bond of a solid dam, beyond its largest value.
+BY_FORCE = SOLID | {"law": "bond", "sigma_max": 1e5, "adhesion": 2e5, "G_f": 100.0}
+BY_FORCE |= {"h_dam": 15.0, "h_found": 60.0, "drive": "dissipation", "drive_energy": 2e3}
+BY_FORCE |= {"drive_load": "force", "force_x": 1e6}
+
 
 def test_dissipation_control_follows_a_level_through_its_snap_back():
     stepper = LoadStepper(load("dam", SNAP_BACK, "47,48", steps=10))
@@ -178,8 +184,9 @@ def test_dissipated_energy_of_loading_and_unloading(law, settings):
         ("ssnp133", {}, None, 40),
         ("dam", SNAP_BACK | {"n_joint": 10.0}, "47,48", 8),
         ("dam", SNAP_BACK | {"n_joint": 10.0, "drive_load": "quake", "k_h": 0.1}, "40,40", 5),
+        ("dam", BY_FORCE | {"uplift": "cracked"}, "30", 10),
     ],
-    ids=["traction", "level", "quake"],
+    ids=["traction", "level", "quake", "force on a solid dam with water in its crack"],
 )
 def test_both_engines_follow_a_snap_back(tmp_path, name, settings, levels, steps):
     options = {"fields": False, "picture": False, "progress": False}
@@ -193,6 +200,9 @@ def test_both_engines_follow_a_snap_back(tmp_path, name, settings, levels, steps
         assert_allclose(one, other, rtol=0, atol=1e-6 * np.abs(one).max())
     if name == "ssnp133":
         assert "moves to and fro: snap-back" in path_statement(results[0])
+    if case["drive_load"] == "force":
+        factor = results[0].history["load_factor"]
+        assert factor[-1] < 0.9 * factor.max() and results[0].last["crack_length"] > 0
 
 
 @pytest.mark.heavy
