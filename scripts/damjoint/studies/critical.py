@@ -669,14 +669,13 @@ class Search:
             comes_near = run.state.loading.level > (1 - ABOVE) * path.highest
             near_drains = path.loses_drains and not comes_near
             return replace(result, why="", doubt=end_at_drains(path)) if near_drains else result
+        beyond = stands_beyond(result.why, level)
         known = path.interval[1] > level  # from a path by other increments
-        result = replace(
-            result, why="", doubt=by_increments(path) if known else stands_beyond(level)
-        )
+        result = replace(result, why="", doubt=by_increments(path) if known else beyond)
         if self.of != "level":
             return result
         if path.to_growth:
-            result = replace(result, mode=GROWTH, why=stands_beyond(level), doubt="")
+            result = replace(result, mode=GROWTH, why=beyond, doubt="")
         return replace(result, growth=path.highest, after={BY_RUN: float(level)})
 
     def by_statics(self, failing: FailurePath) -> tuple[str, str, str]:

@@ -47,13 +47,10 @@ def end_of_branch(path: FailurePath) -> str:
     )
 
 
-def stands_beyond(level: float) -> str:
-    """What is said of the end of a branch above which a run stands at a level [m]."""
-    return (
-        "there the branch of equilibria ends: no increment of the crest, of the joints or of the "
-        f"process zone, however short, leads on; but a run stands at {level:.6g} m, on another "
-        "branch, where the state may depend on its steps"
-    )
+def stands_beyond(end: str, level: float) -> str:
+    """What is said of the end of a path, in words, above which a run stands at a level [m]."""
+    where = "on another branch, where the state may depend on its steps"
+    return f"{end}; but a run stands at {level:.6g} m, {where}"
 
 
 def end_at_drains(path: FailurePath) -> str:
