@@ -113,9 +113,9 @@ DISPLACEMENTS = "crest_ux", "heel_opening", "toe_opening", "slip_mean"
 
 def peak_cells(name: str, peak: dict[str, float], unit: str) -> tuple[str, str, str]:
     """Unit, value and time [s] of a peak; name: its column of quake.csv."""
+    unit = "mm" if name.startswith(DISPLACEMENTS) else unit
     if "opening" in name and peak["value"] <= 0:
         return unit, "closed", ""
-    unit = "mm" if name.startswith(DISPLACEMENTS) else unit
     return unit, in_unit(peak["value"], unit), f"{peak['time']:.3f}"
 
 
