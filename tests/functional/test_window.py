@@ -907,8 +907,8 @@ def test_graphs_do_not_overlap_and_are_fewer_where_it_is_narrow(size):
 @pytest.mark.parametrize(
     ("values", "low", "interval", "unit"),
     [
-        ([0, 0, 0], -2, 1, "m"),  # in the middle
-        ([1e-20, 0], -2, 1, "m"),  # round-off
+        ([0, 0, 0], -2, 1, "mm"),  # in the middle
+        ([1e-20, 0], -2, 1, "mm"),  # round-off
         ([0, 45], 0, 15, "m"),
         ([-3e-6, 1.4e-6], -3, 1.5, "µm"),
         ([-586, -100], -600, 150, "m"),

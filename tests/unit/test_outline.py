@@ -217,7 +217,7 @@ def test_curves_of_a_joint_with_unordered_nodes():
         (1.2683e7, FORCES, "12.68 MN/m"),
         (150e3, FORCES, "150 kN/m"),
         (4.2e-7, LENGTHS, "420 nm"),
-        (0.0, LENGTHS, "0 m"),
+        (0.0, LENGTHS, "0 mm"),
     ],
 )
 def test_units_by_magnitude(value, units, text):
