@@ -207,9 +207,10 @@ class Earthquake:
         """Two steps of half the length up to a time, or their rest."""
         if halvings == MOST_HALVINGS:
             largest, limit = np.abs(self.now.state.jump).max(), LARGEST_JUMP * self.case.size
+            end_of_solution = self.problem.model.end_of_solution
             reason = (
-                f"no equilibrium with a time step of {self.dt / 2**halvings:.3g} s: "
-                f"{self.problem.model.end_of_solution}"
+                f"no equilibrium with a time step of {self.dt / 2**halvings:.3g} s"
+                + (f": {end_of_solution}" if end_of_solution else "")
                 if largest < 0.9 * limit
                 else f"the displacement jump reaches {limit:.3g} m, beyond small displacements"
             )
