@@ -200,6 +200,12 @@ class Law(Generic[V]):
         """Largest shear stress (q,) [Pa] at a normal stress, damage, slip [m]; or infinite."""
         return np.full(np.shape(sigma_n), np.inf)
 
+    @property
+    def intact_cohesion(self) -> float:
+        """Shear strength [Pa] of an undamaged point without normal stress; or infinite."""
+        none = np.zeros(1)
+        return float(self.shear_strength(none, none, none)[0])
+
     def tension_left(self, damage: Array) -> Array:
         """Tension (q,) [Pa] that points at a damage may still carry without a loss of their shear
         strength: it presses on the others.

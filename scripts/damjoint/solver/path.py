@@ -333,9 +333,9 @@ class Point:
         """By how much the level may be higher between another equilibrium and this one [m]: up to
         the strength that is lost by points that begin to soften in between.
         """
-        none, strengths = np.zeros(1), list[float]()
+        strengths = list[float]()
         for law in self.laws:
-            shear = float(law.shear_strength(none, none, none)[0])
+            shear = law.intact_cohesion
             strengths.append(law.tensile_strength + (shear if shear < np.inf else 0.0))
         return self.level * self.lost(begin, strengths, begun=True) / self.thrust
 

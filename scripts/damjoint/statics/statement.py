@@ -28,7 +28,7 @@ def statement(results: Results) -> str:
     if not last:
         return reason_at_first(results, mode)
     if results.stopped:
-        where = f"level {highest_level(results):.6g} m (t = {last['time']:.6g})"
+        where = where_stopped(results)
         if mode == "out of range":
             return (
                 f"out of range: the displacement needs a level below 0 or above "
@@ -67,7 +67,7 @@ def reason_of_stop(results: Results) -> str:
     state after unstable crack growth, and so its strength, depends on steps and mesh.
     """
     case, last, shown = results.case, results.last, results.info.get("mechanism")
-    where = f"level {highest_level(results):.6g} m (t = {last['time']:.6g})"
+    where = where_stopped(results)
     if grown := results.info.get("unstable_growth"):
         where += f", after unstable crack growth at level {min(grown):.6g} m"
     if shown:
@@ -92,13 +92,14 @@ def reason_of_stop(results: Results) -> str:
     )
 
 
-def highest_level(results: Results) -> float:
-    """The last level [m], or the highest of the equilibrium path where the last state is its limit
-    point: the same to the precision.
+def where_stopped(results: Results) -> str:
+    """The last level and time; the highest level of the equilibrium path where the last state is
+    its limit point: the same to the precision.
     """
     level, shown = float(results.last["level"]), results.info.get("mechanism")
     most = shown["level"] if shown else level
-    return most if level < most <= (1 + PRECISION) * level else level
+    level = most if level < most <= (1 + PRECISION) * level else level
+    return f"level {level:.6g} m (t = {results.last['time']:.6g})"
 
 
 def words_of_bound(reached: Bound) -> str:

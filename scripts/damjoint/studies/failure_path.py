@@ -105,11 +105,8 @@ class FailurePath(EquilibriumPath):
         brittle = any(law.softens and law.tensile_strength > 0 for law in laws.laws)
         #: whether a joint without tension slips point by point before it slips whole, each of which
         #: loses its cohesion: the increments all the way decide which points are left
-        none = np.zeros(1)
         self.loses_cohesion = any(
-            law.softens
-            and not law.tensile_strength
-            and 0 < float(law.shear_strength(none, none, none)[0]) < np.inf
+            law.softens and not law.tensile_strength and 0 < law.intact_cohesion < np.inf
             for law in laws.laws
         )
         self.releases_shear = laws.releases_shear

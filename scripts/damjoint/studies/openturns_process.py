@@ -140,7 +140,7 @@ def normal(ranks: Array) -> Any:
     return ot.Normal([0.0] * len(ranks), [1.0] * len(ranks), pearson)
 
 
-def design_point(
+def nearest_failure(
     ask: Ask, ranks: Array, start: Sequence[float], tolerances: Sequence[float], unit: float
 ) -> DesignPoint | None:
     """The design point, by a search from a start; None if it finds none.

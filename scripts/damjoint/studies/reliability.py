@@ -31,8 +31,7 @@ from ..threads import limited_threads
 from . import keys, sampling
 from .critical import Search
 from .critical_value import CriticalValue
-from .openturns_process import OpenTurns, openturns, points_around
-from .openturns_process import design_point as nearest_point
+from .openturns_process import OpenTurns, nearest_failure, openturns, points_around
 from .plan import Plan, Sample, checked, in_file, planned_cases, rounded, up_to
 from .sweep import ERROR, error_message, search_of, spread_bundles
 
@@ -455,7 +454,7 @@ def design_point(limit: LimitState, library: OpenTurns, start: Sequence[float]) 
     unit = UNIT * float(np.linalg.norm(limit.gradient(start))) or 1.0
     tolerances = TOLERANCE, precision / unit
     problem = variables.rank_correlations(), start, tolerances, unit
-    found = library.result(nearest_point, *problem, answers=limit)
+    found = library.result(nearest_failure, *problem, answers=limit)
     if found is None:
         origin = dict.fromkeys(variables.names, float("nan"))
         nothing = (0.0,) * len(start), origin, origin
