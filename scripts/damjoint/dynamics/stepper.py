@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .. import ROUND_OFF, RunError
+from .. import RunError
 from ..arrays import Array, Sparse
 from ..fem.bodies import Bodies
 from ..input.case import Case
@@ -161,13 +161,16 @@ class Earthquake:
         )
         #: longest step [s]
         self.dt = self.record.time_step(case)
+        #: difference below which two times are the same [s]: half of the shortest step, above what
+        #: the rounding of many steps adds up to
+        self.same_time = self.dt / 2 ** (MOST_HALVINGS + 1)
         self.now = self.problem.at_rest
         self.steps_of_length: dict[int, TimeStep] = {}
 
     @property
     def finished(self) -> bool:
         """Whether the record has ended."""
-        return self.now.time >= self.record.duration - ROUND_OFF * self.dt
+        return self.now.time >= self.record.duration - self.same_time
 
     @property
     def halvings(self) -> int:
@@ -186,14 +189,15 @@ class Earthquake:
         """
         while not self.finished:
             # a whole number of steps from the start: an interrupted run has the same ones
-            number = math.floor(self.now.time / self.dt + ROUND_OFF) + 1
+            number = math.floor((self.now.time + self.same_time) / self.dt) + 1
             yield from self._steps_to(number * self.dt, 0)
 
     def _steps_to(self, end: float, halvings: int) -> Iterator[Converged]:
         """The steps up to a time, of the length dt / 2^halvings or shorter."""
         length = self.dt / 2**halvings
-        if self.now.time > end - length * (1 - ROUND_OFF):  # the rest of an interrupted step
-            if self.now.time < end - ROUND_OFF * length:
+        remains = end - self.now.time
+        if remains < length - self.same_time:  # the rest of an interrupted step
+            if remains > self.same_time:
                 yield from self._halves(end, halvings)
             return
         step = self._step(length, halvings)
@@ -217,7 +221,7 @@ class Earthquake:
             raise RunError(f"earthquake: after t = {self.now.time:.6g} s {reason}")
         middle = end - self.dt / 2 ** (halvings + 1)
         for target in (middle, end):
-            if self.now.time < target - ROUND_OFF * self.dt:
+            if self.now.time < target - self.same_time:
                 yield from self._steps_to(target, halvings + 1)
 
     def _step(self, length: float, halvings: int) -> Converged | None:
