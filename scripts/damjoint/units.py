@@ -19,13 +19,17 @@ MOMENTS: Units = (("MN m/m", 1e-6), ("kN m/m", 1e-3), ("N m/m", 1))
 FLUXES: Units = tuple((f"{name}g/(m s)", 1000.0**i) for i, name in enumerate(["k", "", *"mµnp"]))
 
 
+#: Units of zeros, where they are among the units.
+OF_ZEROS = "mm", "MPa"
+
+
 def unit(values: Iterable[np.ndarray], units: Units) -> tuple[str, float]:
-    """The first unit in which the largest value is at least 1; of zeros mm, or the first one; name
-    and factor.
+    """The first unit in which the largest value is at least 1; of zeros one of OF_ZEROS, or the
+    first one; name and factor.
     """
     largest = max((np.abs(v).max(initial=0) for v in values), default=0)
     if not largest:
-        return next((u for u in units if u[0] == "mm"), units[0])
+        return next((u for u in units if u[0] in OF_ZEROS), units[0])
     return next((u for u in units if largest * u[1] >= 1), units[-1])
 
 

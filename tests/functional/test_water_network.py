@@ -385,6 +385,8 @@ def test_the_gravity_method_of_several_heels(model):
     own = model("imposed", [12.0], joints=BASES | {"contraction": (10, 0, 10, 10)}).case.joints[0]
     with pytest.raises(InputError, match="uplift = imposed: has no gravity method where joints"):
         Uplift(own, RigidBlock(own), 12.0, 0.0, 0.0)
+    several = "water leaves at more than one toe, or at a heel"
+    assert gravity.obstacle(own, {}, {"time": 1.0}) == several
     assert gravity.of_state(own, {}, {"time": 1.0}) is None
 
 

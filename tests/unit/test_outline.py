@@ -17,7 +17,8 @@ from damjoint.model.fields import (
 from damjoint.model.loads import STAGED, Loading
 from damjoint.pictures.outline import JointLine, section_outline, skin
 from damjoint.pictures.scene import displaced_faces, fluid_above, fluids
-from damjoint.units import FORCES, LENGTHS, unit, with_unit
+from damjoint.studies.report_input import suitable_unit
+from damjoint.units import FORCES, LENGTHS, STRESSES, unit, with_unit
 from numpy.testing import assert_allclose
 
 
@@ -223,3 +224,9 @@ def test_curves_of_a_joint_with_unordered_nodes():
 def test_units_by_magnitude(value, units, text):
     assert with_unit(value, units) == text
     assert unit([np.array([0, -value])], units)[0] == text.split()[1]
+
+
+def test_a_zero_has_one_unit_in_results_and_parameters():
+    zero = np.zeros(2)
+    assert unit([zero], LENGTHS)[0] == "mm" and unit([zero], FORCES)[0] == "MN/m"
+    assert unit([zero], STRESSES) == suitable_unit("Pa", zero) == ("MPa", 1e-6)

@@ -143,7 +143,9 @@ def call(arguments: argparse.Namespace) -> int:
     on_note = partial(print_note, case)
     planned = PlannedRows(case, plan)
     count, rows = sweep(planned, out, arguments.jobs, arguments.scheduler, on_note)
-    say(f"{count} rows computed; {out}\n")
+    kept = len(rows) - count
+    computed = f"{count} rows computed" if count or not kept else "nothing to compute"
+    say(f"{computed}{f', {kept} rows were there already' if kept else ''}; {out}\n")
     say(f"{rows_table(plan, rows, table_width(arguments))}\n")
     report_sweep(case, plan, rows, [] if plan.sampled else planned.cases, out, arguments.intensity)
     return 0

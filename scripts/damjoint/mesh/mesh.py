@@ -74,6 +74,13 @@ def mesh_of(case: Case) -> Mesh:
     return mesh
 
 
+def crest_level(case: Case) -> float:
+    """Level of the crest [m]; of a user's own geometry the highest of its concrete."""
+    if case.geometry:
+        return mesh_of(case).user_geometry.reach[1]
+    return float(case["dam_height"])
+
+
 def check_loads(case: Case, mesh: Mesh) -> None:
     """Raise InputError if the mesh of a user's own geometry lacks what a load or support of the
     case acts on, or if its levels or lists of values are not those of this dam.
@@ -93,8 +100,7 @@ def check_loads(case: Case, mesh: Mesh) -> None:
         )
     if case.source:
         case.source.check_lists([joint.name for joint in mesh.joints])
-    heights = mesh.user_geometry.concrete[:, 1]
-    low, high = float(heights.min()), float(heights.max())
+    low, high = mesh.user_geometry.reach
     check_strain(case, high - low)
     if case["face_load"] == "hydrostatic":
         for name, levels in (("levels", case.levels), ("tail_levels", case.tail_levels)):

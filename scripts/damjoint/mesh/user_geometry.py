@@ -125,10 +125,17 @@ class UserGeometry:
             ]
         )
 
+    @cached_property
+    def reach(self) -> tuple[float, float]:
+        """The lowest and the highest level of the concrete [m]."""
+        heights = self.concrete[:, 1]
+        return float(heights.min()), float(heights.max())
+
     @property
     def height(self) -> float:
         """Height of the concrete [m]."""
-        return float(np.ptp(self.concrete[:, 1]))
+        low, high = self.reach
+        return high - low
 
     @property
     def volume(self) -> float:

@@ -256,18 +256,29 @@ def factors_of_state(
 def of_state(case: Case, rows: Table, state: Mapping[str, float]) -> GravityMethod | None:
     """The gravity method at the only joint of a user's own geometry, which alone holds what is
     above it, at a state of the finite elements, a row of the history: the resultant of the loads
-    follows from N, T, M and the uplift. None if the joint is not plane, if the water has no path
-    (see `path_of`), or if it follows from a crack before a pseudo-static earthquake.
+    follows from N, T, M and the uplift. None if there is an `obstacle`.
 
     rows: of the joint's table.
     """
-    joint, path = JointLine(case), path_of(case, case.tail_at(state["time"]))
-    if freezes_uplift(case) or not (path and joint.is_plane(rows)):
+    if obstacle(case, rows, state):
         return None
+    joint = JointLine(case)
     (tx, ty), normal, shear = joint.along, state["N"] + state["U"], state["T"]
     moment = state["M"] + state["M_U"]
     loads = Load("all loads", tx * shear + ty * normal, ty * shear - tx * normal, 0.0, moment)
     return shortest_crack(case, joint, (loads,), state["time"], state["level"])
+
+
+def obstacle(case: Case, rows: Table, state: Mapping[str, float]) -> str:
+    """Why a joint of a user's own geometry has no gravity method; empty if it has one: see
+    `of_state`.
+    """
+    if freezes_uplift(case):
+        return "its water pressure follows from the crack before the earthquake"
+    if not path_of(case, case.tail_at(state["time"])):
+        several = "it meets other joints in 3D" if case["dim"] == 3 else ""
+        return several or "water leaves at more than one toe, or at a heel"
+    return "" if JointLine(case).is_plane(rows) else "the joint is not plane"
 
 
 def with_crack(case: Case, time: float, level: float, crack: float) -> GravityMethod:

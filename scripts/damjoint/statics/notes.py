@@ -138,7 +138,7 @@ def understood(case: Case) -> str:
         return ""
     mesh = mesh_of(case)
     geometry, unit = mesh.user_geometry, "m2" if mesh.dim == 3 else "m"
-    low, high = geometry.concrete[:, 1].min(), geometry.concrete[:, 1].max()
+    low, high = geometry.reach
     weight = case["rho_dam"] * case["g"] * geometry.volume
     joints = (
         f"{f'{joint.name} ' if len(mesh.joints) > 1 else ''}{joint.ends['joint_along'][0]:.5g} m"
@@ -186,7 +186,7 @@ def notes_on_geometry(case: Case, mesh: Mesh) -> Iterator[str]:
                 "are in no face: no water presses on them"
             )
     if case["rho_water"]:
-        top = geometry.concrete[:, 1].max()
+        _, top = geometry.reach
         if level > top and case["crest_water"] and TOP not in sides:
             yield f"no face crest surface: no pressure on the crest (y = {top:g} m) below the water"
         if case["floor_water"] and not sides & {FLOOR, BED}:
@@ -204,7 +204,7 @@ def notes_on_geometry(case: Case, mesh: Mesh) -> Iterator[str]:
     if cavities := geometry.cavities:
         several = f"{len(cavities)} cavities, one" if len(cavities) > 1 else "a cavity"
         yield f"the mesh has {several} at {cavities[0]}"
-    crest, high = geometry.regions["crest"].points[0, 1], geometry.concrete[:, 1].max()
+    crest, (_, high) = geometry.regions["crest"].points[0, 1], geometry.reach
     if UP in sides and crest < high - geometry.height / 2:
         yield f"crest lies at y = {crest:.5g} m, the dam reaches {high:.5g} m: not its crest"
     if geometry.height < LOWEST:

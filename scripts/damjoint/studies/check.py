@@ -221,16 +221,28 @@ def hand_calculation(result: Results, alone: bool = True) -> GravityMethod | Non
     """The gravity method for a joint, the only one of `result`, at a case's last level with all
     loads; at the last state of a run under displacement control or beyond the last level, up to a
     critical one, and of a user's own geometry, whose loads are those of the finite elements. None
-    if it does not apply there, see `gravity.of_state`.
+    if there is an `obstacle`.
 
     alone: whether this joint alone holds what is above it.
     """
     case, last = result.case, result.last
     if case.geometry:
-        return gravity.of_state(case, result.at(), last) if last and alone else None
+        applies = not obstacle(result, alone)
+        return gravity.of_state(case, result.at(), last) if applies else None
     if last and (case["drive"] != "level" or last["time"] > case.times[-1]):
         return gravity.at(case, last["time"], last["level"])
     return gravity.at(case, case.times[-1])
+
+
+def obstacle(result: Results, alone: bool) -> str:
+    """Why `hand_calculation` does not apply to a joint; empty if it does."""
+    if not result.case.geometry:
+        return ""
+    if not result.last:
+        return "the run has no state"
+    if not alone:
+        return "the joint does not hold alone what is above it"
+    return gravity.obstacle(result.case, result.at(), result.last)
 
 
 def compare_methods(result: Results, statement: str, unjudged: str, alone: bool) -> SafetyCheck:
@@ -239,7 +251,8 @@ def compare_methods(result: Results, statement: str, unjudged: str, alone: bool)
     elements = by_finite_elements(result, statement, unjudged, alone)
     accuracy = result.info.get("error_estimate", {}).get("statement", "")
     if not method:
-        return SafetyCheck(elements, None, accuracy)
+        without = f"no gravity method: {obstacle(result, alone)}"
+        return SafetyCheck(elements, None, accuracy, gravity_notes=[without])
     partial = bool(result.case.geometry) and result.partial_load
     longer = [by_gravity(longer, LONGER, partial) for longer in method.further]
     crack = result.last["crack_length"] if result.last else 0.0
@@ -281,7 +294,7 @@ class SafetyCheck:
     accuracy: str = ""
     #: results of the gravity method with longer cracks that are in equilibrium, too
     longer: Sequence[MethodResult] = ()
-    #: notes on the results of the gravity method
+    #: notes on the results of the gravity method, or why there are none
     gravity_notes: Sequence[str] = ()
 
     def __repr__(self) -> str:
@@ -393,13 +406,7 @@ class SafetyCheck:
             )
         if case["f_c"]:
             notes.append("the finite elements' stress at the toe, a corner, depends on the mesh")
-        if self.gravity is None:
-            notes.append(
-                "no gravity method: it needs a plane joint that alone holds what is above it, "
-                "water that leaves at one toe, and none that follows from a crack before an "
-                "earthquake"
-            )
-        elif not self.comparable:
+        if self.gravity and not self.comparable:
             reached, last = self.finite_elements.time, self.gravity.time
             note = "no differences: the finite elements did not reach the last level with all loads"
             notes.append(note + ("" if math.isnan(reached) else f", t = {reached:.5g} of {last:g}"))

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..input.case import Case
-from ..mesh.mesh import mesh_of
+from ..mesh.mesh import crest_level
 from ..model.fields import Solution
 from ..model.loads import Loading
 from ..model.results import Results
@@ -129,13 +129,6 @@ def figure_of(content: Content) -> Figure:
             position = 0, -0.5 / (HEIGHT - LEGEND - 0.2)
             axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=position, frameon=False)
     return figure
-
-
-def crest_level(case: Case) -> float:
-    """Level of the crest [m]."""
-    if geometry := case.geometry and mesh_of(case).user_geometry:
-        return float(geometry.concrete[:, 1].max())
-    return float(case["dam_height"])
 
 
 def draw_levels(axes: Axes, content: Content) -> None:

@@ -15,6 +15,7 @@ from ..engines.condensed.solve import about
 from ..fem.bodies import Bodies
 from ..input.case import Case
 from ..laws import Evidence
+from ..mesh.mesh import crest_level
 from ..model.fields import Solution
 from ..model.results import Info, Results, row_of_joint
 from ..post import folder as folders
@@ -117,7 +118,7 @@ def printed_lines(answer: CriticalValue, search: Search) -> list[str]:
         else:
             lines = [f"{critical}, not confirmed: {answer.doubt}{mode}"]
     if of == "level" and answer.value is not None:
-        crest = picture.crest_level(search.case)
+        crest = crest_level(search.case)
         if (depth := answer.value - crest) > PRECISION * crest:
             lines.append(
                 f"the crest, at {crest:.6g} m, is overtopped: {depth:.3g} m of water above it"

@@ -190,8 +190,7 @@ def entry(parameter: Parameter, values: Sequence[Value], default: Value) -> Entr
 
 def suitable_unit(known: str, values: np.ndarray) -> tuple[str, float]:
     """The unit in which values of a parameter are shown, and its number per the declared one."""
-    units = UNITS.get(known, ((known, 1),))
-    return unit([values], units if np.any(values) else units[-1:])
+    return unit([values], UNITS.get(known, ((known, 1),)))
 
 
 def same(value: Value, default: Value) -> bool:
