@@ -1,12 +1,15 @@
 """Monotone filling in any number of steps, and the equilibrium path over unstable crack growth."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from damjoint.input.resolve import load
 from damjoint.joint.interface import interface_of
-from damjoint.solver.path import PRECISION, SURE
+from damjoint.solver.load_stepper import LoadStepper
+from damjoint.solver.model import StepResult
+from damjoint.solver.path import PRECISION, SURE, EquilibriumPath, Point
 from damjoint.statics.hints import hints
 from damjoint.statics.statement import statement
 from damjoint.statics.verdict import verdict
@@ -213,6 +216,53 @@ def test_a_path_lost_from_an_earlier_state_is_followed_from_the_last_one(solve):
     assert verdict(result) == "sliding"
     (highest,) = re.findall(r"reaches (\S+) m at most", statement(result))
     assert result.last["level"] == pytest.approx(float(highest), rel=1e-4)
+
+
+#: A small dam on a stiff mixed joint: a limit point, passed by a path from before it (174-27).
+PASSED = {"dam_height": 8.13, "dam_base": 3.8, "dam_crest": 0.191, "E": 1.28e9, "n_joint": 10}
+PASSED |= {"mesh_pattern": "regular", "law": "mixed", "sigma_max": 64200, "G_f": 4.91, "order": 1}
+PASSED |= {"K_N": 6.61e13, "K_T": 6.61e13, "uplift": "imposed", "weight_first": 0}
+
+
+def rows_follow_one_another(stepper):
+    """Whether each row of the history is of an update that has led to the last state."""
+    updates = {update.state.loading.level for update in stepper.state.trace.updates}
+    return set(stepper.history.rows["level"]) <= updates
+
+
+@pytest.mark.heavy
+def test_a_limit_point_that_another_path_passes_has_no_row():
+    """The first one was 2e-5 lower, and no ancestor of the second."""
+    stepper = LoadStepper(replace(load("dam", PASSED, "7.77", steps=4), all_steps=True))
+    stepper.run()
+    assert stepper.stopped
+    assert rows_follow_one_another(stepper)
+
+
+@pytest.mark.heavy
+def test_a_step_to_the_other_equilibrium_of_its_level_is_taken_again():
+    """A table beyond the limit point is replaced by that of the rising branch, and the path goes on
+    from there.
+    """
+    dam = replace(load("dam", PASSED, "4,7.77"), all_steps=True)
+    first = LoadStepper(dam)
+    first.advance_to(1)
+    path = EquilibriumPath([Point(first.model, first.state, first.history.copy())], 2)
+    while path.levels[-1] >= 0.98 * path.highest:
+        path.advance()
+    end = path.points[-1]
+    stepper = first.fork(replace(load("dam", PASSED, (4, end.level, 7.77)), all_steps=True))
+    rising = stepper.fork(stepper.case)
+    rising.advance_to(2)
+    stepper.accept(StepResult(replace(end.state, time=2), 1, 0.0), cuts=0)
+    stepper.save_last()
+    assert abs(stepper.state.jump).max() > 1.01 * abs(rising.state.jump).max()
+    stepper.run()
+    off = abs(stepper.history.saved[0].jump - rising.state.jump).max()
+    assert off < 1e-4 * abs(rising.state.jump).max()
+    assert stepper.history.rows["level"][:2] == [4, end.level]
+    assert stepper.state.loading.level == pytest.approx(path.highest, rel=1e-4)
+    assert rows_follow_one_another(stepper)
 
 
 def test_a_path_ends_where_all_strength_is_lost():

@@ -251,6 +251,20 @@ class History:
             by_round_off=list(self.by_round_off),
         )
 
+    def until(self, time: float) -> History:
+        """Another one with the rows and tables up to a time."""
+        number, tables = (
+            int(np.searchsorted(of, time, "right"))
+            for of in (self.rows["time"], [state.time for state in self.saved])
+        )
+        return replace(
+            self,
+            rows={name: values[:number] for name, values in self.rows.items()},
+            tables=self.tables[:tables],
+            saved=self.saved[:tables],
+            by_round_off=[known for known in self.by_round_off if known <= time],
+        )
+
     @property
     def last(self) -> dict[str, float]:
         """The last row."""

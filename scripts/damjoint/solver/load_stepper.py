@@ -401,19 +401,21 @@ class LoadStepper:
                 self.relaxed_at += (step.state.loading.level,)
         return step
 
-    def along_path(self, time: float) -> StepResult | None:
+    def along_path(self, time: float, again: bool = True) -> StepResult | None:
         """A step along the equilibrium path, until it reaches the level of its time.
 
         If it never does the dam fails: `mechanism`. Then, and where the path is lost, its highest
         level is the last step if only the level changes in it; else shorter steps are to be tried.
+        again: whether the path may begin before the last step, see `before_limit_point`, which it
+        then replaces.
         """
         begin, level = self.state, self.case.level_at(time)
         if begin.time == 0 or level < begin.loading.level:
             return None
         self.path_begin = begin
-        path = EquilibriumPath([Point(self.model, begin, self.history.copy())], time)
+        origin = start = Point(self.model, begin, self.history.copy())
+        path = EquilibriumPath([start], time)
         same = self.same_but_for_level(self.model.loading(time, level), begin.loading)
-        start = path.points[0]
         if same:
             path.advance()
         else:  # no branch: the other loads change at once
@@ -425,38 +427,73 @@ class LoadStepper:
         while path.highest < level:
             # (a mechanism of an earlier path, under other loads, does not end this one)
             fails = path.slides or path.settled(ROUGH if path.ended else SURE)
-            again = (fails or path.ended) and same and path.points[0] is start
-            if again and (earlier := self.before_limit_point(path)):
-                path = EquilibriumPath([earlier], time)
+            first = again and same and origin is start
+            if (fails or path.ended) and first and (earlier := self.before_limit_point(path)):
+                origin, path = earlier, EquilibriumPath([earlier], time)
                 continue
             if fails or path.ended:
-                mechanism = self.mechanism_on(path) if fails else None
-                path.refine()
-                if mechanism:
-                    self.mechanism = replace(mechanism, level=float(path.highest))
-                self.path_ended = same
-                if same:
-                    self.end_at_limit_point(path)
-                return None
+                break
             path.advance()
+        mechanism = None
+        if path.highest < level:
+            mechanism = self.mechanism_on(path) if fails else None
+            path.refine()
+        if origin is not start and self.has_table and path.highest >= begin.loading.level:
+            return self.along_path(time, again=False) if self.retake(path, origin) else None
+        if path.highest < level:
+            if mechanism:
+                self.mechanism = replace(mechanism, level=float(path.highest))
+            self.path_ended = same
+            if same:
+                self.end_at_limit_point(path, origin)
+            return None
+        step = self.to_level_on(path, origin, level, time)
+        if step:
+            self.rewind(origin)
+            self.record_limit_points([point.level for point in path.points])
+        return step
+
+    def to_level_on(
+        self, path: EquilibriumPath, origin: Point, level: float, time: float
+    ) -> StepResult | None:
+        """A step to a level [m] that a path reaches, from its last point below, or from the state
+        from which it has been followed under other loads; the points beyond are removed.
+        """
         arrival = next(n for n, point in enumerate(path.points) if point.level >= level)
         del path.points[arrival + 1 :]  # an increment has two points
-        levels = [point.level for point in path.points]
-        last, beyond = start, path.points[-1]
+        last, beyond = origin, path.points[-1]
         jump = beyond.state.jump
-        if len(levels) > 1:
+        if arrival:
             last = path.points[-2]
-            share = (level - levels[-2]) / (levels[-1] - levels[-2])
+            share = (level - last.level) / (beyond.level - last.level)
             jump = last.state.jump + share * (jump - last.state.jump)
-        strategies = self.model.strategies[:FROM_PATH]
-        control = LevelControl(level)
-        options = StepOptions(strategies, guess=(jump, level))
-        step = self.model.advance(last.state, time, control, options)
-        if step is None:
-            return None
-        self.record_limit_points(levels)
-        spent = beyond.history.iterations_since(len(self.history))
-        return replace(step, iterations=spent + step.iterations)
+        options = StepOptions(self.model.strategies[:FROM_PATH], guess=(jump, level))
+        step = self.model.advance(last.state, time, LevelControl(level), options)
+        spent = beyond.history.iterations_since(len(origin.history))
+        return step and replace(step, iterations=spent + step.iterations)
+
+    @property
+    def has_table(self) -> bool:
+        """Whether the last step has a table."""
+        return self.history.saved_until >= self.state.time
+
+    def retake(self, path: EquilibriumPath, origin: Point) -> bool:
+        """Replace the last step, and its table, by one to its level on a path that has been
+        followed from before it; whether that converges.
+        """
+        level, time = self.state.loading.level, self.state.time
+        step = self.to_level_on(path, origin, level, time)
+        if step:
+            self.rewind(origin)
+            self.accept(step, cuts=0)
+            self.history.save(self.state)
+        return step is not None
+
+    def rewind(self, origin: Point) -> None:
+        """Return to a state: the steps after it are not on the path that has been followed from it,
+        which supersedes them.
+        """
+        self.state, self.history = origin.state, origin.history.copy()
 
     def before_limit_point(self, path: EquilibriumPath) -> Point | None:
         """The state before the first one of a path that does not rise from it, under the same loads
@@ -465,15 +502,13 @@ class LoadStepper:
         """
         start = path.points[0].state
         before = start.previous
-        if (
-            before is None
-            or before.time == 0
-            or path.highest > (1 + PRECISION) * path.points[0].level
-        ):
+        if before is None or before.time == 0 or before.loading.level > start.loading.level:
+            return None
+        if path.highest > (1 + PRECISION) * path.points[0].level:
             return None
         if not self.same_but_for_level(before.loading, start.loading):
             return None
-        return Point(self.model, before, self.history.copy())
+        return Point(self.model, before, self.history.until(before.time))
 
     def record_limit_points(self, levels: list[float]) -> None:
         """Record the first limit point that a path has passed, and the lowest level behind it."""
@@ -494,13 +529,16 @@ class LoadStepper:
         joints = tuple(map(int, path.failing))
         return Mechanism(path.mode, float(ratio), path.time, joint=path.joint, joints=joints)
 
-    def end_at_limit_point(self, path: EquilibriumPath) -> None:
-        """Take a path's limit point as a step, in which nothing but the level has changed."""
+    def end_at_limit_point(self, path: EquilibriumPath, origin: Point) -> None:
+        """Take a path's limit point as a step, in which nothing but the level has changed, from the
+        state from which the path has been followed.
+        """
         top, begin = path.points[path.limit_point], self.state
         rise = top.level - begin.loading.level
         if rise > 0:
             share = rise / (self.case.level_at(path.time) - begin.loading.level)
             time = begin.time + share * (path.time - begin.time)
+            self.rewind(origin)
             spent = top.history.iterations_since(len(self.history))
             reached = replace(top.state, time=time)
             self.accept(StepResult(reached, spent, top.last["residual"]), cuts=0)
