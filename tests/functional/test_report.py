@@ -435,16 +435,17 @@ def test_the_name_of_the_dam_is_in_the_report(command, page, folder, tmp_path):
 
 
 def test_a_picture_is_cut_where_it_is_white(tmp_path):
-    """Into bands that have all of it; none is cut within what is drawn."""
-    drawn = np.full((300, 100, 3), 255, np.uint8)
-    for top in (10, 60, 110, 200):
-        drawn[top : top + 40, 20:80] = 0
+    """Into bands that have all of it: the labels below a panel, the legend above the next one."""
+    drawn = np.full((200, 400, 3), 255, np.uint8)
+    labels, legend = (53, 56), (123, 126)
+    for top, bottom in ((10, 50), labels, (80, 120), legend, (130, 170)):
+        drawn[top:bottom, 20:80] = 0
     Image.fromarray(drawn).save(tmp_path / "all.png")
     parts = [
         np.asarray(Image.open(io.BytesIO(base64.b64decode(address.split(",")[1]))))
         for address in report_picture.bands(tmp_path / "all.png")
     ]
-    assert [len(part) for part in parts] == [55, 50, 70, 95, 30]
+    assert [len(part) for part in parts] == [68, 53, 79]
     assert np.array_equal(np.concatenate(parts), drawn)
     assert all(part[0].min() == part[-1].min() == 255 for part in parts)
 

@@ -17,8 +17,11 @@ from .drawing import runs_of
 
 #: Resolution of the rasterised parts of a picture.
 DPI = 160
-#: Least value of a white pixel; least height of a band over its width, of the first with heading.
-WHITE, LEAST_BAND, FIRST_BAND = 250, 0.1, 0.3
+#: Least value of a white pixel.
+WHITE = 250
+#: Over the width of a picture: height of what is a panel, not text, and of the white that is wider
+#: than between a panel and its text.
+PANEL, WIDE = 0.06, 0.015
 
 
 @dataclass(frozen=True)
@@ -41,14 +44,23 @@ def embedded(figure: Figure) -> list[str]:
 
 
 def bands(path: Path) -> list[str]:
-    """A picture file as data addresses of bands, cut where it is white: pages end between them."""
+    """A picture file as data addresses of bands, cut in the white between two panels: pages end
+    between them.
+
+    The cut is in the widest white if that is WIDE, else above the text of the lower panel.
+    """
     picture = Image.open(path).convert("RGB")
     inked = np.asarray(picture).min(axis=(1, 2)) < WHITE
-    cuts, encoded = [0], list[str]()
+    cuts, encoded, gaps, panels = [0], list[str](), list[tuple[int, int]](), 0
     for ink, first, end in runs_of(inked):
-        least = LEAST_BAND if len(cuts) > 1 else FIRST_BAND
-        if not ink and first - cuts[-1] > least * picture.width:
-            cuts.append((first + end) // 2)
+        if not ink:
+            gaps.append((first, end))
+        elif end - first > PANEL * picture.width:
+            if panels and gaps:
+                widest = max(gaps, key=lambda gap: gap[1] - gap[0])
+                wide = widest[1] - widest[0] > WIDE * picture.width
+                cuts.append(sum(widest if wide else gaps[0]) // 2)
+            gaps, panels = [], panels + 1
     for top, bottom in pairwise([*cuts, picture.height]):
         file = io.BytesIO()
         picture.crop((0, top, picture.width, bottom)).save(file, "PNG")

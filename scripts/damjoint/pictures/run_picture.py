@@ -434,12 +434,6 @@ def draw_history(figure: AnyFigure, shown: list[Panel], result: Results) -> None
         for number, (values, color, label) in enumerate(lines):
             style = LINES[number % len(LINES)]
             axes.plot(level, values * factor, style, color=color, markersize=3, label=label)
-        for step, text in marks:
-            position = level[step], lines[0][0][step] * factor
-            axes.plot(*position, "o", color=RED, markersize=8, mfc="none", label="_changed")
-            away = {"xytext": (-7, -2), "textcoords": "offset points"}
-            # below the mark: above it the frame of the panel would cross the text
-            axes.annotate(text, position, **away, ha="right", va="top", fontsize=7, color=RED)
         if not high or axes is row[-1]:
             axes.set_xlabel("reservoir level [m]", fontsize=9)
         axes.set_ylabel(f"{quantity} [{name}]", fontsize=8.5)
@@ -449,10 +443,21 @@ def draw_history(figure: AnyFigure, shown: list[Panel], result: Results) -> None
             axes.set_yticks([0.0])  # no values below zero beside it
         if name == "%":
             axes.set_ylim(*PERCENT)
+        for step, text in marks:
+            mark_change(axes, (level[step], lines[0][0][step] * factor), text)
         # one legend for all panels of several joints
         without = row[-1] if high else row[0]
         if len(lines) > 1 and not (result.case.of_joints and axes is without):
             legend_above(axes)
+
+
+def mark_change(axes: Axes, position: tuple[float, float], text: str) -> None:
+    """Mark a point of a panel of the history; the text is on the side away from the frame."""
+    axes.plot(*position, "o", color=RED, markersize=8, mfc="none", label="_changed")
+    _, height = axes.transAxes.inverted().transform(axes.transData.transform(position))
+    down, side = (-2, "top") if height > 0.5 else (2, "bottom")
+    away: dict[str, Any] = {"xytext": (-7, down), "textcoords": "offset points"}
+    axes.annotate(text, position, **away, ha="right", va=side, fontsize=7, color=RED)
 
 
 #: Styles of the lines of a panel, so that they differ without colors.

@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..dynamics.record_files import STANDARD_GRAVITY
 from ..model.loads import Loading
 from ..model.results import column_of
 from ..pictures.drawing import (
@@ -34,8 +35,6 @@ from ..pictures.outline import exaggeration
 from ..pictures.scene import loads_label, state_label
 from .quake_result import QuakeResult
 
-#: Of accelerations in g [m/s2].
-GRAVITY = 9.81
 #: Height of the curves, and of the deformed dams below them [inches].
 CURVES, SHAPES = 12.0, 2.6
 #: Colors of heel and toe, joint by joint.
@@ -146,7 +145,7 @@ def most_slip(result: QuakeResult) -> list[int]:
 def facts_of(result: QuakeResult) -> list[str]:
     """The record with its largest acceleration; loads and state of each joint before it; notes."""
     case, before = result.case, result.before
-    peak = np.abs(result.rows["ground_ax"]).max() / GRAVITY
+    peak = np.abs(result.rows["ground_ax"]).max() / STANDARD_GRAVITY
     texts = [f"record {Path(result.summary['record']).name}, largest acceleration {peak:.3g} g"]
     if last := before.last:
         loading = Loading.at(case, last["time"], last["level"], last["tail_level"])

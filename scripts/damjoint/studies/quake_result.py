@@ -125,12 +125,15 @@ def in_unit(value: float, unit: str) -> str:
 
 
 def peaks_table(summary: dict[str, Any], case: Case, of_joints: bool = True) -> Table:
-    """Tabulate the peaks of a summary; of_joints: also those of the joints."""
+    """Tabulate the peaks of a summary, without what a meaning says of other laws; of_joints: also
+    those of the joints.
+    """
     columns, rows = quake_columns(case), list[tuple[str, ...]]()
     for name, peak in summary["peaks"].items():
         unit, meaning = columns[name]
         if of_joints or name in quake_summary.PEAKS:
-            rows.append((meaning, *peak_cells(name, peak, unit)))
+            words = re.split("[:(]", meaning)[0].strip()
+            rows.append((words, *peak_cells(name, peak, unit)))
     return Table(["peak of", "unit", "value", "at t"], ["", "", "", "s"], rows)
 
 
@@ -234,8 +237,7 @@ def text(case: Case, summary: dict[str, Any], width: int | None = None) -> str:
     each; width: of the terminal, None: all columns.
     """
     peaks = peaks_table(summary, case, of_joints=not case.of_joints)
-    # the first words of a meaning: an explanation may follow
-    short = [(re.split("[:,(]", name)[0].strip(), *cells) for name, *cells in peaks.rows]
+    short = [(name.split(",")[0], *cells) for name, *cells in peaks.rows]  # without the sign
     parts = [aligned(short, peaks.stacked, left=2)]
     if case.of_joints:
         joints = joints_table(summary, case)

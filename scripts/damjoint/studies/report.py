@@ -610,7 +610,8 @@ def drawn(solution: Solution) -> Iterator[tuple[str, str, Figure]]:
     if has_fields:
         section = figure_of(*HALF)
         run_picture.draw_dam(section, solution, time)
-        yield "half", f"Section and loads {at_level}, deformed.", section
+        what = "Dam" if run_picture.is_user_solid(result.case) else "Section and loads"
+        yield "half", f"{what} {at_level}, deformed.", section
     maps = has_fields and run_picture.is_user_solid(result.case)
     colors = "" if maps else " Red: broken; violet: softening; orange: slipped."
     rows = several and not maps

@@ -15,6 +15,7 @@ from ..dynamics import ground_motion
 from ..dynamics.record import Record
 from ..dynamics.record_files import STANDARD_GRAVITY
 from ..input.case import Case
+from ..input.parameters import declared
 from ..model.results import Info, column_of
 from ..pictures.drawing import BLUE, DARK, ORANGE, figure_of, panels
 from ..pictures.report_picture import Picture, bands, embedded
@@ -77,7 +78,12 @@ def read(folder: Path, case: Case, info: Info) -> Earthquake | None:
     else:
         tables["end"] = quake_result.residual_table(summary, case)
     spectra = Picture("full", "", embedded(draw_spectra(rows, first)))
-    return Earthquake(spectra, pictures, tables, [note[0].upper() + note[1:] for note in notes])
+    return Earthquake(spectra, pictures, tables, [as_sentence(note) for note in notes])
+
+
+def as_sentence(note: str) -> str:
+    """A note with a capital letter, unless it begins with the name of a parameter."""
+    return note if note.split()[0] in declared() else f"{note[0].upper()}{note[1:]}"
 
 
 def components(rows: Columns) -> list[tuple[str, Array]]:
