@@ -30,10 +30,12 @@ def empty_cache(tmp_path_factory):
 
 @pytest.fixture(scope="session", autouse=True)
 def one_thread():
-    """Also of what tests call without a command, which chooses the number of threads itself: on two
-    cores, two processes with two threads each take five times as long.
+    """In the processes of the tests and in those that they start: on two cores, two processes with
+    two threads each take up to five times as long.
     """
-    with limited_threads(1):
+    with pytest.MonkeyPatch.context() as patch, limited_threads(1):
+        for library in ("OMP", "OPENBLAS"):
+            patch.setenv(f"{library}_NUM_THREADS", "1")
         yield
 
 

@@ -424,8 +424,8 @@ def measure(measurements: Measurements) -> tuple[dict[str, Table], list[str]]:
     studies += [bench_commands.orders, bench_cost.engines, bench_cost.joints]
     studies += [bench_commands.quakes, bench_hard.hard]
     tables += [study(measurements) for study in studies]
-    tables.append(modelings(measurements, cases))
     with threadpool_limits(1):
+        tables.append(modelings(measurements, cases))
         exact, overkill = bench_accuracy.overkill(measurements)
         tables += [overkill, bench_accuracy.accuracy(measurements, exact, cases["start"][0])]
         tables.append(bench_accuracy.recommended(measurements, exact))
