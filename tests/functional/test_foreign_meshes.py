@@ -70,7 +70,11 @@ def test_a_med_file_keeps_its_groups(drawn):
 
 
 def test_an_abaqus_file_by_meshio(drawn, monkeypatch):
+    """In plane strain, as the bodies of a dam are in Abaqus."""
     monkeypatch.chdir(drawn)
+    deck = (drawn / "dam.inp").read_text()
+    assert "CPS3" in deck
+    (drawn / "dam.inp").write_text(deck.replace("CPS3", "CPE3"))
     exec(recipe("python"), {})
     assert_same(mesh_in(drawn), mesh_in(drawn, "expected.msh"))
 
@@ -85,20 +89,26 @@ def test_an_abaqus_file_itself_is_refused(drawn, monkeypatch, allowed):
     assert f"## {heading}\n" in PAGE.read_text()
 
 
-def test_a_drawing_in_step_format(tmp_path, monkeypatch):
-    """In millimetres, as CAD programs write it."""
+@pytest.mark.parametrize("unit", [1.0, 1e3])
+def test_a_drawing_in_step_format(tmp_path, monkeypatch, unit):
+    """In millimetres, as CAD programs write it; of another size a line says what is missing."""
     start_gmsh()
     gmsh.clear()
-    corners = [gmsh.model.occ.addPoint(1e3 * x, 1e3 * y, 0) for x, y in SECTION]
+    corners = [gmsh.model.occ.addPoint(unit * x, unit * y, 0) for x, y in SECTION]
     lines = [
         gmsh.model.occ.addLine(corner, following)
         for corner, following in zip(corners, corners[1:] + corners[:1], strict=True)
     ]
     gmsh.model.occ.addPlaneSurface([gmsh.model.occ.addCurveLoop(lines)])
     gmsh.model.occ.synchronize()
+    gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
     gmsh.write(str(tmp_path / "dam.step"))
     (tmp_path / "dam.geo").write_text(recipe("gmsh"))
     monkeypatch.setenv("DAMJOINT_RUN_GEO", "1")
+    if unit == 1:
+        with pytest.raises(InputError, match="no edge or corner where joint, face, toe and crest"):
+            mesh_in(tmp_path, "dam.geo")
+        return
     mesh = mesh_in(tmp_path, "dam.geo")
     (joint,) = mesh.joints
     assert joint.ends["joint_length"][0] == pytest.approx(34)

@@ -1137,6 +1137,9 @@ def test_the_chart_of_earthquakes_shows_their_slip(monkeypatch):
     assert crosses == pytest.approx([80]) and len(edges) == 1
     limits = [line.get_ydata()[0] for line in lines if line.get_linestyle() == "--"]
     assert limits == pytest.approx([50, -50])
+    small = quake_rows("record_scale", [1.0], [1e-9], ["stands"])
+    plan = Plan({"record_scale": [1.0]}, {}, {}, "", Limits((0.05,)))
+    assert "residual slip [mm]" in drawn_panels(monkeypatch, plan, small)  # the unit of the limit
 
 
 def test_statistics_of_earthquakes_are_those_of_their_slip(monkeypatch):

@@ -210,7 +210,8 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
         if drawn == OPENING:  # of a joint that is closed everywhere it is an overlap
             values = np.maximum(values, 0.0)
         shown = values if valued else values[~bad]
-        size, factor = unit([np.nan_to_num(shown)], units)
+        limits = plan.quake.slip if drawn == SLIP and plan.quake else ()
+        size, factor = unit([np.nan_to_num(shown), np.array([*limits])], units)
         for number, (key, members) in enumerate(sorted(curves.items(), key=lambda item: item[1])):
             color, mark = CURVES[number % len(CURVES)]
             good = np.where(bad[members], np.nan, values[members] * factor)
@@ -233,9 +234,9 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
         panel.grid(alpha=0.3)
         if drawn == FACTOR:
             draw_verdicts(panel, table, x, values)
-        if drawn == SLIP and plan.quake and plan.quake.slip:
+        if limits:
             least = np.nanmin(values, initial=0.0)
-            draw_limits(panel, [v * factor for v in plan.quake.slip], least < 0)
+            draw_limits(panel, [v * factor for v in limits], least < 0)
         if np.nan_to_num(shown).any():
             widen(panel.yaxis)
         else:
