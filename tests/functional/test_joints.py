@@ -225,7 +225,7 @@ def test_settings_of_a_joint_apply_to_it_alone():
             "lift_heights = 12,25,50: each must be > 0 and < dam_height (45 m)",
         ),
         ({"E_dam": (1e10, 2e10, 1e10, 1e10)}, "E_dam = 1"),
-        ({"mu": (0.9, -1.0, 1.0, 1.0)}, "mu = -1.0: must be"),
+        ({"mu": (0.9, -1.0, 1.0, 1.0)}, "mu = -1: must be"),
         ({"mesh_pattern": "regular"}, "mesh_pattern = regular: must be"),
         ({"joint_slope": (20.0, -20.0, 0.0, 0.0)}, "lift_heights = 12,25,38: must increase"),
     ],

@@ -401,7 +401,7 @@ def test_values_of_a_sweep_are_checked():
     for words, message in (
         ({}, "sweep: must have values or a sample"),
         ({"vary": {"mu": [0.7, 0.8]}}, "sweep: must have values or a sample, such as mu="),
-        ({"mu": [0.8, -1]}, "mu = -1.0: must be"),
+        ({"mu": [0.8, -1]}, "mu = -1: must be"),
         ({"mu": 0.8, "jobs": 0}, "jobs = 0: must be an integer >= 1"),
         ({"mu": 0.8, "tie": {"mu": "1"}}, "mu: must be given once"),
     ):

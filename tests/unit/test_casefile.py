@@ -197,7 +197,7 @@ def test_every_preset_fits_a_dam(tmp_path, path):
         ("default_drain_eff = 1;", "did you mean drain_effectiveness or "),
         ("Struct Joint::base [ E 1e10 ];", "E: is of the whole dam: must be set by default_E"),
         ("Struct Joint::base [ mu ];", "must be a number"),
-        ("Struct Joint::base [ mu -1 ];", "mu = -1.0: must be a number > 0"),
+        ("Struct Joint::base [ mu -1 ];", "mu = -1: must be a number > 0"),
         ("Struct Joint::base { mu 1 };", "must be Struct Joint::NAME [ parameter value, ... ]"),
         ("Struct Base [ mu 1 ];", "Struct Joint::<joint> [ <parameter> value, ... ]"),
         ("mu() = {1}; Struct Joint::base [ mu 1 ];", "mu() is a list: must be in blocks for all"),

@@ -71,7 +71,7 @@ class SolvedScene:
                 verdict=verdict(result),
                 end_state=state,
                 message=message,
-                statement=message or "the dam stands",
+                statement=message or "stands",
                 failed=bool(state) or failed(result),
                 joint=joint,
                 numbers=[Numbers.at(joint_result, time) for time in times],

@@ -384,6 +384,8 @@ class Tree:
         if not match or name not in self.fields:
             return message
         self.marked, field, why = name, self.fields[name], match["why"]
+        if match["name"] in self.known:  # its meaning is the label
+            why = why.removesuffix(f" ({self.known[match['name']].meaning})")
         for words, of_window in WINDOW_WORDS.items():
             why = why.replace(words, of_window)
         label = shown_label(field)

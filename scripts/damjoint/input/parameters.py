@@ -151,7 +151,8 @@ class Parameter:
 
         Raises InputError if it is not a number, out of range or not one of the choices.
         """
-        setting, rule = f"{self.name} = {value}", f"must be {self.allowed()} ({self.meaning})"
+        shown = f"{value:.15g}" if isinstance(value, float) else value
+        setting, rule = f"{self.name} = {shown}", f"must be {self.allowed()} ({self.meaning})"
         result: Value = value
         if not self.text:
             try:
