@@ -20,8 +20,8 @@ from . import RunError
 from .engines import Engine, OnStep, Outcome
 from .input.case import Case
 from .input.refinement import has_plane_fields
+from .model import process_zone
 from .model.results import Results
-from .statics import process_zone
 from .statics.verdict import stiffness_ratio
 
 #: Parameters that set the mesh, besides the sizes h_dam and h_found, which follow.

@@ -38,6 +38,9 @@ ABOVE = 1.005
 #: The failure that ends a branch only: there may be an equilibrium above it.
 UNSTABLE = "unstable crack growth"
 
+#: Entries of run.json with levels at which a state has jumped to another branch.
+JUMPS = "unstable_growth", "broken_at_once", "passed_over"
+
 
 # -- load steps
 # --------------------------------------------------------------------------------------------------
@@ -64,7 +67,7 @@ def follows_steps(request: Request, *records: dict[str, Any]) -> bool:
     takes as constant.
     """
     falls = any(list(levels) != sorted(levels) for levels in (request.levels, request.tail_levels))
-    names = "unstable_growth", "limit_points", "weight_with_water"
+    names = *JUMPS, "limit_points", "weight_with_water"
     unstable = any(record.get(name) for record in records for name in names)
     entering = any(v["uplift"] == "cracked" for v in request.joints)
     turns = request.joints[0]["dim"] == 3 and any(v["law"] != "rupture" for v in request.joints)

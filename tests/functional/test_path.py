@@ -10,11 +10,12 @@ from damjoint.joint.interface import interface_of
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.solver.model import StepResult
 from damjoint.solver.path import PRECISION, SURE, EquilibriumPath, Point
-from damjoint.statics.hints import hints
-from damjoint.statics.statement import statement
+from damjoint.statics.hints import hints, hints_on_path
+from damjoint.statics.statement import level_of_growth, statement
 from damjoint.statics.verdict import verdict
 from damjoint.studies.critical import Search
 from damjoint.studies.failure_path import FailurePath
+from damjoint_tools.random_scenes import random_scene
 from variants import further
 
 #: 45 m dam with drains on a joint that cracks and slides slightly.
@@ -216,6 +217,21 @@ def test_a_path_lost_from_an_earlier_state_is_followed_from_the_last_one(solve):
     assert verdict(result) == "sliding"
     (highest,) = re.findall(r"reaches (\S+) m at most", statement(result))
     assert result.last["level"] == pytest.approx(float(highest), rel=1e-4)
+
+
+def test_a_step_over_a_limit_point_says_so_and_names_critical(solve):
+    """A bond without tension stands at 48.7 m with 16 steps; its path ends at 48.49 m."""
+    scene = replace(random_scene(31, 2).rising_from(7.5, 48.7), steps=16)
+    (result,) = solve("dam", scene.levels, scene.tail_levels, 16, **scene.settings)
+    assert verdict(result) == "stands"
+    ((begin, end),) = result.info["passed_over"]
+    assert begin < 48.49 < end == 48.7
+    said = " ".join(hints_on_path(result))
+    assert "the load step from level 46.125 to 48.7 m passes over a limit point" in said
+    assert "levels above 46.125 m are reached after unstable crack growth" in said
+    assert level_of_growth(result) == begin
+    # where the mesh resolves the process zone no halves are computed
+    assert not LoadStepper(load("a")).unresolved
 
 
 #: A small dam on a stiff mixed joint: a limit point, passed by a path from before it (174-27).

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from damjoint.input.resolve import load
-from damjoint.statics import process_zone
+from damjoint.model import process_zone
 from damjoint.statics.hints import hints
 
 #: A joint of 34 m that opens; its zone has 0.58 m.

@@ -221,6 +221,8 @@ class Info(TypedDict, total=False):
     unstable_growth: Sequence[float]
     #: levels [m] before and after each step in which a joint breaks at once
     broken_at_once: Sequence[tuple[float, float]]
+    #: levels [m] before and after each step of which a half leads to no equilibrium
+    passed_over: Sequence[tuple[float, float]]
     #: time [-] of the largest change of the water pressure beyond that of the levels, and this [Pa]
     pressure_moves: tuple[float, float]
     #: how the last solution ended without an equilibrium

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..input.case import Case
 from ..joint.interface import Interface
+from ..model import process_zone
 from ..model.loads import LEVEL, Loading, Unknown
 from ..model.results import Info, Results
 from .controls import Control, DissipationControl, LevelControl, drive_control
@@ -27,6 +28,9 @@ SAME_TIME = 1e-9
 #: Mean damage of a joint that a step may add without being tried again by shorter ones [-]: it may
 #: have led to another equilibrium than the nearest one, as where the whole joint slips at once.
 LEAP = 0.2
+#: Mean damage of a joint that a step may add without its halves being tried [-], where the mesh
+#: does not resolve the fracture process zone: points break one by one there.
+GROWS = 0.02
 #: Mean difference of the damage of a joint up to which two states are the same [-].
 SAME_DAMAGE = 0.02
 
@@ -82,6 +86,10 @@ class LoadStepper:
         self.relaxed_at: tuple[float, ...] = ()
         #: levels between which a joint has broken at once, and no shorter steps lead there [m]
         self.leapt: tuple[tuple[float, float], ...] = ()
+        #: levels before and after each step of which a half leads to no equilibrium [m]
+        self.passed_over: tuple[tuple[float, float], ...] = ()
+        #: whether the mesh does not resolve the fracture process zone of a joint
+        self.unresolved = any(map(process_zone.unresolved, self.case.joints))
         #: time of the step in which the pressure of water in time has changed most beyond the
         #: change of the levels, and by how much [Pa]
         self.largest_move = (0.0, 0.0)
@@ -245,6 +253,8 @@ class LoadStepper:
             if step and self.leaps(step) and self.by_shorter_steps(step):
                 yield self.state
                 continue
+            if step:
+                self.try_halves(step)
             if step is None and not weighed:
                 weighed = True
                 if weight := self.weigh():
@@ -308,13 +318,34 @@ class LoadStepper:
             moves = bool(step and not least and other.moves_pressure(step))
             accepted = bool(step and not moves and not other.leaps(step))
             if step and accepted:
+                other.try_halves(step)
                 other.accept(step, cuts=0)
         if self.model.damage_between(other.state, whole.state) <= SAME_DAMAGE:
             return False
         self.state, self.history = other.state, other.history
-        self.largest_move = other.largest_move
+        self.largest_move, self.passed_over = other.largest_move, other.passed_over
         self.on_step(end)
         return True
+
+    def try_halves(self, step: StepResult) -> None:
+        """Record a direct step that adds damage, but of which a half leads to no equilibrium: it
+        has passed over a limit point.
+        """
+        begin, end = self.state, step.state
+        if self.drives or not self.unresolved:
+            return
+        if self.model.damage_between(begin, end) <= GROWS:
+            return
+        levels = float(begin.loading.level), float(end.loading.level)
+        if levels in self.leapt:
+            return
+        other = self.fork(self.case)
+        for time in ((begin.time + end.time) / 2, end.time):
+            half = other.direct_step(time, smallest=False)
+            if half is None:
+                self.passed_over += (levels,)
+                return
+            other.accept(half, cuts=0)
 
     def record_leap(self, begin: State, end: State) -> None:
         """Record that a joint breaks at once from one state to another."""
@@ -568,6 +599,7 @@ class LoadStepper:
             "limit_points": self.limit_points,
             "unstable_growth": self.relaxed_at,
             "broken_at_once": self.leapt,
+            "passed_over": self.passed_over,
             "pressure_moves": self.largest_move if self.largest_move[1] > 0 else (),
             "end_of_solution": self.end_of_solution,
             "converged_by_round_off": self.history.by_round_off,

@@ -8,9 +8,11 @@ from ..arrays import Table
 from ..input.case import Case
 from ..input.values import flows_in_time, has_drains
 from ..laws import Evidence
+from ..model import process_zone
 from ..model.results import Results
 from ..units import STRESSES, with_unit
-from . import gravity, process_zone
+from . import gravity
+from .statement import level_of_growth
 from .verdict import STIFF_JOINT, stiffness_ratio, verdict
 
 #: Depth and width of the foundation over the dam's height below which the crack is too long: a 45 m
@@ -119,12 +121,27 @@ def hints_on_path(results: Results) -> list[str]:
             f"from level {begin:.5g} to {end:.5g} m a joint breaks at once, and no shorter steps "
             "lead there: what is left of its strength may depend on the steps"
         )
+    if steps := results.info.get("passed_over"):
+        (begin, _), (_, end) = steps[0], steps[-1]
+        where = f"from level {begin:.5g} to {end:.5g} m"
+        several = f"{len(steps)} load steps {where} pass"
+        messages.append(
+            (several if len(steps) > 1 else f"the load step {where} passes")
+            + " over a limit point, as a half of it leads to no equilibrium: the state after it "
+            "depends on the steps"
+        )
     # of the same digits where a step reaches just above the first one, so that it is passed twice
     digits = (tuple(f"{h:.4g}" for h in both) for both in results.info.get("limit_points", ()))
     for limit, lowest in dict.fromkeys(digits):
         messages.append(
             f"unstable crack growth at level {limit} m: along the equilibrium path the level falls "
             f"to {lowest} m before it rises again"
+        )
+    level = level_of_growth(results)
+    if level is not None and results.case["drive"] == "level":
+        messages.append(
+            f"levels above {level:.5g} m are reached after unstable crack growth: damjoint "
+            "critical finds the highest level of the continuous branch"
         )
     if results.info.get("engine") == "getdp" and verdict(results) == "not converged":
         messages.append(

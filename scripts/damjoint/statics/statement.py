@@ -9,7 +9,7 @@ from ..input.case import Case
 from ..input.constraints import STAGED
 from ..input.values import has_drains, level_unknown
 from ..model.results import Results
-from ..solver.path import PRECISION
+from ..solver.path import FALL, PRECISION
 from ..units import FORCES, STRESSES, with_unit
 from . import gravity
 from .verdict import STIFF_JOINT, Bound, bound, failure, slipped_from, stiffness_ratio, verdict
@@ -68,8 +68,8 @@ def reason_of_stop(results: Results) -> str:
     """
     case, last, shown = results.case, results.last, results.info.get("mechanism")
     where = where_stopped(results)
-    if grown := results.info.get("unstable_growth"):
-        where += f", after unstable crack growth at level {min(grown):.6g} m"
+    if (grown := level_of_growth(results)) is not None:
+        where += f", after unstable crack growth at level {grown:.6g} m"
     if shown:
         ratio = shown["displacement_ratio"]
         along = f" (followed to {ratio:.2g} times the displacement of that level)"
@@ -90,6 +90,17 @@ def reason_of_stop(results: Results) -> str:
         + (f"{end}; " if end else "")
         + f"there the resultant is {arm:.3g} m from the toe, T/N' = {last['T'] / last['N']:.3g}"
     )
+
+
+def level_of_growth(results: Results) -> float | None:
+    """The level [m] above which others are reached after unstable crack growth: the state then
+    depends on steps and mesh, or the level has fallen on the way. None if there is none.
+    """
+    info = results.info
+    falls = (top for top, low in info.get("limit_points", ()) if low < (1 - FALL) * top)
+    steps = (*info.get("broken_at_once", ()), *info.get("passed_over", ()))
+    begins = (begin for begin, _ in steps)
+    return min((*info.get("unstable_growth", ()), *falls, *begins), default=None)
 
 
 def where_stopped(results: Results) -> str:

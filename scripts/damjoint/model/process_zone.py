@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from ..input.case import Case
-from ..model.results import Results
+from .results import Results
 
 #: Factor of the zone's length [-].
 RICE = 9 * math.pi / 32
@@ -62,6 +62,11 @@ def shear(case: Case) -> Zone | None:
     if "G_t" not in case.law.least_energies(case.values) or not case["adhesion"]:
         return None
     return zone(case, "G_t", "adhesion", "9 pi/32 E' G_t/c^2")
+
+
+def unresolved(case: Case) -> bool:
+    """Whether a zone of the only joint of a case would have fewer than `LEAST` elements."""
+    return any(ahead and ahead.elements < LEAST for ahead in (tension(case), shear(case)))
 
 
 def too_short(results: Results) -> Iterator[Zone]:
