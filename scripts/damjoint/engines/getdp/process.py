@@ -14,14 +14,16 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import InputError, RunError, data
+from ... import ROUND_OFF, InputError, RunError, data
+from ...arrays import Array
 from ...input.case import Case
 from ...input.parameters import assignments, constants, declared, in_rows, listing, quoted
 from ...input.scene import LINES, SIDES, TRACTION
 from ...mesh.chord import Chord
-from ...mesh.joint_mesh import heel_normal
+from ...mesh.joint_mesh import JointMesh, heel_normal
 from ...mesh.mesh import Mesh
 from ...mesh.sides import area
+from ...model.network import path_coordinate
 from ...model.results import Info
 from ...storage import check_end
 from .paths import has_level_ends, lines, values_of_paths
@@ -36,6 +38,9 @@ SINGLE_PROCESS = {
 }
 #: Time limit for a program to print its version [s].
 VERSION_TIMEOUT = 60
+
+#: Change of direction [rad] from which a joint is bent.
+BENT = 1e-6
 
 #: A number as GetDP prints it.
 NUMBER = r"(\d+\.?\d*(?:e[+-]?\d+)?)"
@@ -140,7 +145,24 @@ def position_of_joint(mesh: Mesh, number: int) -> str:
         "heel_start": start,
         "heel_edge": end - start,
     }
+    if mesh.dim == 2 and len(bends := straight_parts(joint)) > 2:
+        vectors |= {"bend_x": bends[:, 0], "bend_y": bends[:, 1]}
     return lines(values) + "".join(listing(name, vector) for name, vector in vectors.items())
+
+
+def straight_parts(joint: JointMesh) -> Array:
+    """Ends of the straight parts of a joint in the plane, from heel to toe (n, 2); empty if a part
+    turns from another one by more than a right angle.
+    """
+    order = np.argsort(path_coordinate(joint.surface, joint.heel_nodes, joint.toe_nodes))
+    points = joint.surface.points[order, :2]
+    along = np.diff(points, axis=0)
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    if (along @ along.T).min() < -ROUND_OFF:
+        return np.zeros((0, 2))
+    bent = np.linalg.norm(np.diff(along, axis=0), axis=1) > BENT
+    ends: Array = points[[True, *bent, True]]
+    return ends
 
 
 def macro_of_joint(number: int, values: str) -> str:
