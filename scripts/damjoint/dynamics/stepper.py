@@ -1,4 +1,6 @@
-"""The dam through a record: steps of the prescribed length, halved where they do not converge."""
+"""The dam through a record: steps of the prescribed length, halved where they do not converge or do
+not resolve an impact.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +18,7 @@ from ..solver.model import LARGEST_JUMP, Model
 from ..solver.state import State
 from . import absorbing
 from .absorbing import AbsorbingRock, travel_time
+from .impact import Contact
 from .massless import MasslessRock
 from .published import with_corner_dashpots
 from .record import Record
@@ -164,6 +167,12 @@ class Earthquake:
         #: difference below which two times are the same [s]: half of the shortest step, above what
         #: the rounding of many steps adds up to
         self.same_time = self.dt / 2 ** (MOST_HALVINGS + 1)
+        #: of the joints that part what is above them from the rest, by their numbers
+        self.contacts = {
+            number: contact
+            for number in range(len(case.joints))
+            if (contact := Contact.of(self.problem, case, number))
+        }
         self.now = self.problem.at_rest
         self.steps_of_length: dict[int, TimeStep] = {}
 
@@ -225,7 +234,9 @@ class Earthquake:
                 yield from self._steps_to(target, halvings + 1)
 
     def _step(self, length: float, halvings: int) -> Converged | None:
-        """A step of a length; None if it does not converge."""
+        """A step of a length; None if it is to be halved: it does not converge, or does not resolve
+        an impact.
+        """
         now = self.now
         if self.published and self.problem.dashpots.any():
             problem = with_corner_dashpots(self.problem, now.state)
@@ -239,5 +250,9 @@ class Earthquake:
         if advanced is None:
             return None
         end, step = advanced
+        if not persist and not all(
+            contact.resolved(now, end) for contact in self.contacts.values()
+        ):
+            return None
         ground = self.record.at(now.time + length)
         return Converged(end, ground, length, step.iterations, step.residual)

@@ -46,7 +46,7 @@ def compute(case: Case, progress: bool = True) -> QuakeTables:
         error = RunError(f"earthquake: the static loads have no equilibrium: {reason}")
     rows, number = computed.rows, len(computed.rows["time"])
     halvings = round(np.log2(vibrations.dt / rows["dt"].min())) if number else 0
-    summary = quake_summary.summary(vibrations, rows, halvings)
+    summary = quake_summary.summary(vibrations, rows, halvings, resolves_impacts=False)
     seconds = {name: round(value, 3) for name, value in computed.seconds.items()}
     summary["seconds"] = seconds | {"steps": number}
     if not error:

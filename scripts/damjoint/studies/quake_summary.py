@@ -28,6 +28,10 @@ REST_OF_OPENING = 0.1
 #: Changes below this part of the dam's size count as none [-]: 0.01 mm of 45 m.
 LEAST_MOTION = 2.2e-7
 
+#: Slip in the time of the mean over that in the same time before it, from which on it does not
+#: slow down.
+STEADY = 0.8
+
 #: Time steps in the first period that resolve a joint which opens and slips.
 STEPS_OF_PERIOD = 30
 
@@ -85,8 +89,12 @@ def row_of_peak(name: str, values: Array) -> int:
     return int(np.argmax(values if "opening" in name else np.abs(values)))
 
 
-def summary(quake: Earthquake, rows: Table, halvings: int) -> dict[str, Any]:
-    """Peaks with times, values at the end and at rest, modes, damping, notes; rows: quake.csv."""
+def summary(
+    quake: Earthquake, rows: Table, halvings: int, resolves_impacts: bool = True
+) -> dict[str, Any]:
+    """Peaks with times, values at the end and at rest, modes, damping, notes; rows: quake.csv;
+    resolves_impacts: whether the steps were halved where they do not, see dynamics/impact.py.
+    """
     number = len(rows["time"])
     result: dict[str, Any] = {
         "record": str(quake.case.record),
@@ -119,7 +127,7 @@ def summary(quake: Earthquake, rows: Table, halvings: int) -> dict[str, Any]:
                 f"the slip reaches {slip:.3g} m{of(quake.case, k)}: equilibrium is that of the "
                 "undeformed dam, and the drains through the joint are taken as intact"
             )
-    result["notes"] += lift_offs(quake, rows)
+    result["notes"] += lift_offs(quake, rows, resolves_impacts)
     if "Re" in rows:
         flows = ({n: rows[column_of(n, k)] for n in ("U", "Re")} for k in joints)
         words = map(turbulence, quake.case.joints, flows)
@@ -140,22 +148,18 @@ def intensities(record: Record, period: float) -> dict[str, Any]:
     }
 
 
-def lift_offs(quake: Earthquake, rows: Table) -> list[str]:
+def lift_offs(quake: Earthquake, rows: Table, resolves_impacts: bool) -> list[str]:
     """Parts of the joints that open throughout and land again, with their numbers, in a line."""
     case, parts, shortest = quake.case, list[str](), math.inf
     for number, joint_case in enumerate(case.joints):
-        joint = quake.problem.model.equilibrium.interface.joints[number]
         normal = np.abs(rows[column_of("N", number)])
         opened = rows[column_of("open_length", number)] > OPEN * joint_case.joint_along
         lifted = opened & (normal < UNLOADED * normal.max())
         landings = np.count_nonzero(lifted[:-1] & ~lifted[1:])
         if not landings:
             continue
-        above = case.graph.separated([number])
-        across = quake.system.translation(joint, above, joint.chord.normal)
-        mass = float(across @ quake.system.mass @ across) / joint.width
-        period = 2 * math.pi * math.sqrt(mass / (joint_case["K_N"] * joint_case.joint_along))
-        shortest = min(shortest, period)
+        if number in quake.contacts:
+            shortest = min(shortest, quake.contacts[number].period)
         first, share = rows["time"][lifted][0], rows["dt"][lifted].sum() / rows["dt"].sum()
         where = case.named((number,)) or "the joint"
         start = f"; {where}: " if parts else f"what is above {where} lifts off and lands again, "
@@ -169,12 +173,13 @@ def lift_offs(quake: Earthquake, rows: Table) -> list[str]:
         f"{''.join(parts)}: the contact is elastic, without damping of an impact but by "
         "joint_damping_n"
     )
-    if shortest < STEPS_OF_IMPACT * quake.dt:
+    if not resolves_impacts and shortest < STEPS_OF_IMPACT * quake.dt:
         text += (
             f"; the {'shortest ' * (len(parts) > 1)}period of the contact (the mass above on K_N), "
             f"{shortest:.3g} s, has {shortest / quake.dt:.2g} steps, too few for its impacts, "
-            "which may add energy: what follows is not reliable, accelerations least; compare "
-            f"with dt = {shortest / STEPS_OF_IMPACT:.2g}"
+            "which may add energy: what follows is not reliable, accelerations least; --engine "
+            f"condensed shortens its steps there; compare with it or dt = "
+            f"{shortest / STEPS_OF_IMPACT:.2g}"
         )
     return [text]
 
@@ -201,7 +206,8 @@ def values_at_end(case: Case, rows: Table, period: float) -> dict[str, Any]:
     rest = float(time[-1] - (time[shaken[-1]] if len(shaken) else 0.0))
     length = min(MEAN_OVER, rest / 2)
     last = time > time[-1] - length + ROUND_OFF * time[-1]
-    at_rest, end, residual, broken = bool(length >= period), {}, {}, {}
+    earlier = (time > time[-1] - 2 * length + ROUND_OFF * time[-1]) & ~last
+    at_rest, steady, end, residual, broken = bool(length >= period), False, {}, {}, {}
     for k, joint in enumerate(case.joints):
         column = {name: rows[column_of(name, k)] for name in (*PEAKS_OF_JOINTS, "T")}
         slip, size = column["slip_mean"], joint.joint_length
@@ -209,10 +215,13 @@ def values_at_end(case: Case, rows: Table, period: float) -> dict[str, Any]:
         openings = [np.maximum(column[n], 0.0) for n in ("heel_opening", "toe_opening")]
         rooms = REST_OF_SLIP * np.abs(slip).max(), REST_OF_OPENING * np.max(openings)
         moved = [float(np.ptp(values[last])) if length else 0.0 for values in (plastic, *openings)]
+        moved_before = float(np.ptp(plastic[earlier])) if earlier.any() else 0.0
         limits = np.maximum([rooms[0], rooms[1], rooms[1]], LEAST_MOTION * case.size)
         at_rest &= bool((moved <= limits).all())
+        steady |= bool(moved[0] > max(limits[0], STEADY * moved_before))
         end[column_of("slip", k)] = float(slip[-1])
         end[column_of("change", k)] = moved[0]
+        end[column_of("change_before", k)] = moved_before
         if length:
             heel, toe, mean = (
                 float(column[name][last].mean())
@@ -226,6 +235,7 @@ def values_at_end(case: Case, rows: Table, period: float) -> dict[str, Any]:
         "rest": rest,
         "mean_over": length,
         "at_rest": at_rest,
+        "slides_on": steady and length >= period,
         "end": end,
         "residual": residual if at_rest else {},
         "broken_without_friction": broken,
@@ -301,18 +311,31 @@ def statement(case: Case, summary: dict[str, Any]) -> str:
         slips = [millimetres(summary["residual"], "slip", k) + of(case, k) for k in joints]
         parts.append(f"residual slip {', '.join(slips)}")
     else:
+        end, steady = summary["end"], summary["slides_on"]
         ends = [
-            f"{millimetres(summary['end'], 'slip', k)}{of(case, k)}, changed by "
-            f"{millimetres(summary['end'], 'change', k)}"
+            f"{millimetres(end, 'slip', k)}{of(case, k)}, changed by "
+            f"{millimetres(end, 'change', k)}"
+            + f", by {millimetres(end, 'change_before', k)} in the same time before"
+            * steady
             for k in joints
         ]
         parts.append(
             f"not at rest in the last {summary['mean_over']:.3g} of {summary['rest']:.3g} s "
-            f"without shaking, no residual slip: slip {'; '.join(ends)}; set a longer record_rest"
+            f"without shaking, no residual slip: slip {'; '.join(ends)}; "
+            + (SLIDES_ON + RADIATES * (not case["rock_mass"]) if steady else LONGER_REST)
         )
     parts.append(ENDS[verdict(case, summary)])
     return "; ".join(parts)
 
+
+#: What is said of a dam that is not at rest; of one whose slip does not slow down, and on rock
+#: without mass.
+LONGER_REST = "set a longer record_rest"
+SLIDES_ON = (
+    "the sliding does not slow down: the static loads push the dam on whenever its vibration takes "
+    "its weight off the joint, and their work keeps it vibrating, as long a record_rest as may be"
+)
+RADIATES = "; rock without mass takes no energy of it away: compare with rock_mass = 1"
 
 #: The end of a statement, by its verdict.
 ENDS = {
