@@ -24,7 +24,7 @@ from damjoint.studies.result_file import rows_session
 from .provenance import RECORDED, provenance
 from .random_quakes import random_quake
 from .random_scenes import RandomScene, random_scene
-from .stress import ONE_THREAD, run_of, same_code
+from .stress import ONE_THREAD, critical_levels, has_critical_level, run_of, same_code
 
 #: Folders beside scripts/ that the package reads.
 DATA = "pro", "geo", "cases", "reference"
@@ -92,6 +92,8 @@ class Mutation:
     quake: bool = False
     #: the bodies' fields are needed to notice it
     fields: bool = False
+    #: looked for in critical levels
+    critical: bool = False
 
     def make(self, folder: Path) -> Path:
         """Copy the package into a folder with the error; returns the folder of its modules.
@@ -440,6 +442,22 @@ MUTATIONS = (
         quake=True,
     ),
     Mutation(
+        "critical level x 0.99",
+        "studies/critical.py",
+        "result = self.result(point.level if point else None, path, point)",
+        "result = self.result(0.99 * point.level if point else None, path, point)",
+        has_critical_level,
+        critical=True,
+    ),
+    Mutation(
+        "critical level x 1.01",
+        "studies/critical.py",
+        "result = self.result(point.level if point else None, path, point)",
+        "result = self.result(1.01 * point.level if point else None, path, point)",
+        has_critical_level,
+        critical=True,
+    ),
+    Mutation(
         "storage in an earthquake x 1.02",
         "joint/water.py",
         'stored = self.members[0].case["storage"] * flow.points.weights',
@@ -471,10 +489,7 @@ def look_for(mutation: Mutation, seed: int) -> dict[str, object]:
             out = folder / scene_name
             out.mkdir()
             try:
-                run = run_of(scene, out, fields=mutation.fields)
-                findings = run.violations()
-                wrong, remark = run.stop() if run.files.stopped else (False, "")
-                findings += [remark] if wrong else []
+                findings = found_in(scene, out, mutation)
             except RunError as error:
                 if str(error).startswith(REFUSED):
                     raise
@@ -483,6 +498,15 @@ def look_for(mutation: Mutation, seed: int) -> dict[str, object]:
             if findings:
                 return row | {"scene": scene_name, "finding": findings[0]}
     return row
+
+
+def found_in(scene: RandomScene, folder: Path, mutation: Mutation) -> list[str]:
+    """What the verification of a scene finds."""
+    if mutation.critical:
+        return critical_levels(scene, folder)[0]
+    run = run_of(scene, folder, fields=mutation.fields)
+    wrong, remark = run.stop() if run.files.stopped else (False, "")
+    return [*run.violations(), *([remark] if wrong else [])]
 
 
 def look_for_number(number: int, seed: int) -> dict[str, object]:

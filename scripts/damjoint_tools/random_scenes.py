@@ -73,6 +73,17 @@ class RandomScene:
         return replace(self, settings=settings, levels=text, tail_levels=tail, steps=4)
 
     @property
+    def without_default_hardening(self) -> RandomScene:
+        """The scene without the hardening of a law that it does not ask for, which the search of a
+        critical level omits.
+        """
+        drawn = self.settings.get("pena_tang", -1)
+        given = drawn if isinstance(drawn, tuple) else (drawn,)
+        values = tuple(0 if float(value) == -1 else value for value in given)
+        hardening = values if isinstance(drawn, tuple) else values[0]
+        return replace(self, settings=self.settings | {"pena_tang": hardening})
+
+    @property
     def critical(self) -> list[str]:
         """Arguments of the command that finds its critical level."""
         words = self.words

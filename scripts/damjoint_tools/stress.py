@@ -30,6 +30,7 @@ from damjoint.studies.result_file import rows_session
 from damjoint_witness import again
 from damjoint_witness.earthquake import Shaken
 from damjoint_witness.files import Files
+from damjoint_witness.reader import read
 from damjoint_witness.verify import Witness
 
 from .provenance import RECORDED, provenance
@@ -61,6 +62,9 @@ AGAIN = 5
 NO_START = "the static loads have no equilibrium"
 #: Limit of a command's CPU time [s], and of its duration while others run, over that.
 TIME_LIMIT, LONGEST = 300, 4
+
+#: Options of a run of which only the verdict counts.
+QUICKLY = "--no-picture", "--no-fields"
 
 #: One thread for each command, as several run at the same time.
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
@@ -195,9 +199,8 @@ def computed_again(
         findings += again.other_steps(run.request, run.files, doubled)
         if not doubled.stopped:
             numbers["steps_difference"] = again.difference(run.files, doubled)
-    case = scene.case
-    if case["dim"] == 2 and not again.follows_history(run.request, first_step=False):
-        more, differences = critical_levels(scene, case["dam_height"], folder)
+    if has_critical_level(scene):
+        more, differences = critical_levels(scene, folder)
         findings, numbers = [*findings, *more], numbers | differences
     if findings:
         findings = [text for text in (row["findings"], *findings) if text]
@@ -205,14 +208,18 @@ def computed_again(
     return {name: f"{value:.8g}" for name, value in numbers.items()}
 
 
-def critical_levels(
-    scene: RandomScene, height: float, folder: Path
-) -> tuple[list[str], dict[str, float]]:
+def has_critical_level(scene: RandomScene) -> bool:
+    """Whether the critical level of a scene is found: in 2D, if it does not follow the history."""
+    request = read(scene.words)
+    return request.joints[0]["dim"] == 2 and not again.follows_history(request, first_step=False)
+
+
+def critical_levels(scene: RandomScene, folder: Path) -> tuple[list[str], dict[str, float]]:
     """Find the critical level of a scene from three starts, and verify the state below a confirmed
-    one; returns what is found, and numbers for the row.
+    one, and that none stands above it; returns what is found, and numbers for the row.
     """
 
-    rising = partial(scene.rising_from, again.FIRST_START * height)
+    rising = partial(scene.rising_from, again.FIRST_START * scene.case["dam_height"])
 
     def search(name: str, *levels: float) -> again.Critical | None:
         return again.Critical.of(files_of(rising(*levels).critical, folder, name=name).record)
@@ -233,6 +240,12 @@ def critical_levels(
             findings.append(f"no equilibrium at {again.BELOW:g} of the critical level")
         else:
             findings += again.above(first, below.files, below.request, below.steps)
+        beyond = rising(again.RUNS_TO * first.level).without_default_hardening
+        runs = (
+            files_of(replace(beyond, steps=steps).words, folder, *QUICKLY, name=f"above_{steps}")
+            for steps in again.RUN_STEPS
+        )
+        findings += again.stands_above(first, list(runs))
     return findings, numbers
 
 

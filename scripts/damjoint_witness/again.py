@@ -4,7 +4,7 @@ Under a water level that rises step by step the state does not depend on the ste
 reference/theory.md). The critical level does not depend on the level that the search starts from,
 if the way of the loads is the same; just below it there is an equilibrium, which is verified like
 any other run, and just above it none is certain by statics, nor possible where the strength cannot
-change in between.
+change in between; nor does a run with few or many load steps stand there, but on another branch.
 """
 
 from __future__ import annotations
@@ -33,6 +33,10 @@ STARTS = 0.6, 0.9
 BELOW = 0.995
 #: Level of the state above it, over the first critical level [-].
 ABOVE = 1.005
+#: Level above it to which runs are made, over the first critical level [-], and their load steps.
+RUNS_TO, RUN_STEPS = 1.002, (1, 4, 16)
+#: Levels from which on a run that has jumped to another branch may stand above it, over it [-].
+JUMPED_NEAR = 0.95
 
 
 #: The failure that ends a branch only: there may be an equilibrium above it.
@@ -166,6 +170,30 @@ def above(critical: Critical, files: Files, request: Request, steps: Table) -> I
             f"sliding at the critical level {critical.level:.6g} m, but statics allows {least:.4g} "
             "times the loads above it"
         )
+
+
+def stands_above(critical: Critical, runs: Sequence[Files]) -> Iterator[str]:
+    """Yield which of the runs to a level above a confirmed critical level stand, without having
+    jumped to another branch near it; nothing of unstable growth, which ends a branch only.
+    """
+    if not critical.confirmed or critical.mode == UNSTABLE:
+        return
+    for files in runs:
+        if files.record["verdict"] != "stands" or jumped_to(files) > JUMPED_NEAR * critical.level:
+            continue
+        rows = files.history
+        yield (
+            f"a run of {len(rows['time'])} steps stands at {rows['level'][-1]:.6g} m, above the "
+            f"critical level {critical.level:.6g} m"
+        )
+
+
+def jumped_to(files: Files) -> float:
+    """Return the highest level [m] at which a run says that it has jumped to another branch, or has
+    passed a limit point; 0 if there is none.
+    """
+    found = [files.record.get(name) or [0.0] for name in (*JUMPS, "limit_points")]
+    return float(max(np.max(levels) for levels in found))
 
 
 def has_constant_strength(joint: stops.Joint) -> bool:

@@ -13,8 +13,8 @@ from damjoint_tools.mutations import MUTATIONS, look_for, scenes_of
 BY_NAME = {mutation.name: mutation for mutation in MUTATIONS}
 
 
-def test_there_are_45_mutations_each_of_one_place(tmp_path):
-    assert len(BY_NAME) == 45
+def test_there_are_47_mutations_each_of_one_place(tmp_path):
+    assert len(BY_NAME) == 47
     for mutation in MUTATIONS:
         package = Path(damjoint.__file__).parent
         root = package.parents[1] if mutation.file.startswith("pro/") else package

@@ -99,6 +99,28 @@ def test_statics_confirms_a_critical_level_or_not(tmp_path):
     assert not list(again.above(critical(35.0, mode=again.UNSTABLE), low, request, steps))
 
 
+def test_no_run_stands_above_a_critical_level(tmp_path):
+    """Only one that has jumped to another branch near it, or beyond unstable growth."""
+    runs = [written(tmp_path / str(n), again.RUNS_TO * 0.99 * SLIDES, n) for n in (1, 4)]
+    one, four = again.stands_above(critical(0.99 * SLIDES), runs)
+    assert one == "a run of 1 steps stands at 45.7346 m, above the critical level 45.6434 m"
+    assert four.startswith("a run of 4 steps")
+    assert not list(again.stands_above(critical(0.99 * SLIDES, doubt="not sure"), runs))
+    assert not list(again.stands_above(critical(0.99 * SLIDES, mode=again.UNSTABLE), runs))
+    runs[0].record["passed_over"] = [[0.0, 45.7]]
+    runs[1].record["unstable_growth"] = [20.0]
+    assert list(again.stands_above(critical(0.99 * SLIDES), runs)) == [four]
+    beyond = written(tmp_path / "beyond", again.RUNS_TO * SLIDES, 4)
+    assert list(again.stands_above(critical(SLIDES), [beyond])) == []
+
+
+def test_hardening_that_is_not_asked_for_is_omitted():
+    scene = replace(random_scene(5, 2), settings={"law": "friction"})
+    assert scene.without_default_hardening.settings["pena_tang"] == 0
+    several = replace(scene, settings={"pena_tang": ("-1", 4e9)})
+    assert several.without_default_hardening.settings["pena_tang"] == (0, 4e9)
+
+
 def test_commands_of_a_scene_for_its_critical_level():
     scene = replace(random_scene(5, 2), levels="4,7,9", tail_levels="1,2,2.5")
     rising = scene.rising_from(3.0, 6.0)
