@@ -735,6 +735,32 @@ def test_a_path_begins_as_a_run_where_single_steps_do_not_lead(monkeypatch):
     assert not answer.confirmed and "falls from the first equilibrium on, at 20 m" in answer.doubt
 
 
+#: A stiff, brittle mixed joint that the weight alone breaks (static loads of random quake 152-10).
+BROKEN_BY_WEIGHT = {"dam_height": 106, "dam_base": 88, "dam_crest": 17.6, "n_joint": 20}
+BROKEN_BY_WEIGHT |= {
+    "order": 1,
+    "mesh_pattern": "free",
+    "nu": 0.211,
+    "E": 2.83e10,
+    "h_dam": 26.5,
+    "h_found": 53,
+}
+BROKEN_BY_WEIGHT |= {"found_side": 106, "found_depth": 106, "law": "mixed", "uplift": "cracked"}
+BROKEN_BY_WEIGHT |= {"K_N": 2.47e12, "K_T": 5.38e11, "sigma_max": 3.16e6, "G_f": 22.84}
+BROKEN_BY_WEIGHT |= {"pena_contact": 10, "softening": "exponential"}
+
+
+@pytest.mark.heavy
+def test_a_level_that_depends_on_the_first_one_is_not_confirmed():
+    """The weight with water of 65 m breaks nothing, and the level has a limit point at 71.5 m; with
+    39 m it breaks more than half of the joint, and the dam fails at 57 m.
+    """
+    answer = Search(load("dam", BROKEN_BY_WEIGHT, "65", "0"), "level").run()
+    assert answer.value == pytest.approx(71.5, abs=0.1)
+    assert not answer.confirmed
+    assert "on the first level (the weight alone leads to no equilibrium)" in answer.doubt
+
+
 @pytest.mark.heavy
 def test_a_highest_level_that_depends_on_the_increments_is_not_confirmed(monkeypatch):
     def differs(self):

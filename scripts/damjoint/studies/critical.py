@@ -324,6 +324,8 @@ class Search:
         else:
             ways = further_ways(path, whole is path, mechanism=bool(result.why))
             result = result if result.why else self.with_end_of(path, result)
+        if first.weighed_with_water:
+            ways.append({"case": lower_begin(path.case)})
         checks = [(path, ways)] if result.why and not result.after else []
         # the growth of a single point may be passed over
         if (result.why and result.after) or (grows and first.releases_shear):

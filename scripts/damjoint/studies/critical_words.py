@@ -10,7 +10,10 @@ from .failure_path import FailurePath
 def by_increments(path: FailurePath) -> str:
     """What is said of a highest level that is not certain."""
     low, high = path.interval
-    return f"between {low:.6g} and {high:.6g} m, depending on the increments of displacement"
+    on = "the increments of displacement"
+    if path.weighed_with_water:
+        on += " and on the first level (the weight alone leads to no equilibrium)"
+    return f"between {low:.6g} and {high:.6g} m, depending on {on}"
 
 
 def falls_at_once(point: Point) -> str:

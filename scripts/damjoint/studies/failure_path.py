@@ -208,6 +208,14 @@ class FailurePath(EquilibriumPath):
         return self.stops and not known
 
     @property
+    def weighed_with_water(self) -> bool:
+        """Whether the weight, which is to act first, has led to no equilibrium without water: a law
+        with a history then depends on the first level.
+        """
+        history = self.stepper.model.equilibrium.path_dependent
+        return self.begun_by_run and bool(self.case["weight_first"]) and history
+
+    @property
     def loses_drains(self) -> bool:
         """Whether a crack that reaches the drains of a joint takes their effect."""
         return any(j["uplift"] == "cracked" and has_drains(j) for j in self.case.joints)
