@@ -235,7 +235,7 @@ def values_at_end(case: Case, rows: Table, period: float) -> dict[str, Any]:
         "rest": rest,
         "mean_over": length,
         "at_rest": at_rest,
-        "slides_on": steady and length >= period,
+        "slides_on": bool(steady and length >= period),
         "end": end,
         "residual": residual if at_rest else {},
         "broken_without_friction": broken,
