@@ -192,6 +192,7 @@ def test_a_row_of_a_sweep_in_which_a_load_never_acts_is_refused(refused, mine):
             "default_temperature_found = 5; default_expansion_found = 0;",
             "temperature_found has no effect: expansion_found = 0",
         ),
+        ("default_dam_height = 8;", "the highest level is above the crest, 8 m: the overflow acts"),
         ("times() = {2};", "the level 6 m at t = 1 is no load step"),
         ("times() = {1, 1.5};", "the level 9 m at t = 2 is no load step"),
     ],

@@ -364,6 +364,19 @@ def test_a_factor_below_one_of_an_equilibrium_is_explained():
     assert "below 1" not in state_label(case, state | {"T": 1.0002 * known * state["T"]})
 
 
+def test_a_high_picture_of_a_section_has_less_rock_than_dam():
+    """Of many joints; the legend, below it, has then a single column."""
+    solution = dj.run(dj.case("lifts", n_joint=10, order=1)).solution
+    figure = pictures.figure_of(5, 14)
+    pictures.draw_dam(figure, solution, solution.result.last["time"])
+    (axes,), (legend,) = figure.axes, figure.legends
+    figure.draw_without_rendering()
+    assert -axes.get_ylim()[0] < 45 < axes.get_ylim()[1]
+    assert legend._ncols == 1
+    box = legend.get_window_extent()
+    assert box.y1 < axes.get_window_extent().y0 and box.x1 < figure.bbox.x1
+
+
 def test_the_step_of_the_earthquake_is_marked_where_the_level_stands_twice(runs):
     """With levels 30, 42, 42 the third step; with a level that no earlier step had, none is."""
     result = runs("sloping").solution.result

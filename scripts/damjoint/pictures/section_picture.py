@@ -48,9 +48,9 @@ from .scene import (
 
 #: Length of an arrow over the dam's size.
 ARROW = 0.16
-#: Over the dam's height: ground shown beside and below; distance of a level's mark from the edge;
-#: depth of the drains; distance of the middle third below the joint.
-BESIDE, BELOW, MARK, DRAIN, THIRD = 0.6, 0.45, 0.1, 0.3, 0.025
+#: Over the dam's height: ground shown beside and below, and below at most; distance of a level's
+#: mark from the edge; depth of the drains; distance of the middle third below the joint.
+BESIDE, BELOW, DEEP, MARK, DRAIN, THIRD = 0.6, 0.45, 0.8, 0.1, 0.3, 0.025
 #: Length of the resultant's arrow over that of the others; space above all, for a label, over the
 #: height of the picture.
 RESULTANT, LABEL = 2.5, 0.05
@@ -108,20 +108,25 @@ class SectionDrawing:
         self.write_legend()
 
     def write_legend(self) -> None:
-        """Write the legend below the section, which gives way to more rows than usual."""
+        """Write the legend below the section, which gives way to more rows than usual; in a single
+        column if there is room.
+        """
         handles, labels = zip(*self.legend, strict=True) if self.legend else ((), ())
-        figure, more = self.axes.figure, -(-len(labels) // 2) - ROWS
-        if more > 0:
-            height = figure_size(figure)[1]
-            box = self.axes.get_position(original=True)
-            box.y0 = (BOTTOM + LEGEND * (1 + more / ROWS)) / height
+        figure, height = self.axes.figure, figure_size(self.axes.figure)[1]
+        box = self.axes.get_position(original=True)
+        room = box.y0 * height - BOTTOM  # inches
+        columns = 1 if room > LEGEND * len(labels) / ROWS > LEGEND else 2
+        needed = LEGEND * max(-(-len(labels) // columns) / ROWS, 1)
+        if needed > room:
+            box.y0 = (BOTTOM + needed) / height
             self.axes.set_position(box)
+        bottom = max(room - needed, 0) + ABOVE_EDGE
         figure.legend(
             handles,
             labels,
             loc="lower left",
-            bbox_to_anchor=(0.01, ABOVE_EDGE / figure_size(figure)[1]),
-            ncols=2,
+            bbox_to_anchor=(0.01, bottom / height),
+            ncols=columns,
             fontsize=7.5,
             frameon=False,
             borderpad=0.2,
@@ -130,7 +135,9 @@ class SectionDrawing:
         )
 
     def set_limits(self) -> None:
-        """Show the dam, and enough ground to fill the axes."""
+        """Show the dam, and enough ground to fill the axes, but not more than DEEP: they are then
+        lower.
+        """
         dam, ground = self.section.dam.points, self.section.foundation.points
         beside, below = BESIDE * self.height, BELOW * self.height
         left, right = dam[:, 0].min() - beside, dam[:, 0].max() + beside
@@ -139,11 +146,18 @@ class SectionDrawing:
         top = max(crest, self.loading.level) + 1.2 * ARROW * self.height
         top += LABEL * (top - bottom)
         width, height = self.axes.bbox.size
+        deepest = max(bottom - (DEEP - BELOW) * self.height, ground[:, 1].min())
         bottom -= max((right - left) * height / width - (top - bottom), 0)
         wider = max((top - bottom) * width / height - (right - left), 0) / 2
-        (x0, y0), (x1, _) = ground.min(axis=0), ground.max(axis=0)
-        self.axes.set_xlim(max(left - wider, x0), min(right + wider, x1))
-        self.axes.set_ylim(max(bottom, y0), top)
+        left, right = max(left - wider, ground[:, 0].min()), min(right + wider, ground[:, 0].max())
+        bottom = max(bottom, deepest)
+        self.axes.set_xlim(left, right)
+        self.axes.set_ylim(bottom, top)
+        lower = height - (top - bottom) / (right - left) * width
+        if lower > 0:
+            box = self.axes.get_position(original=True)
+            box.y0 += lower / self.axes.figure.bbox.height
+            self.axes.set_position(box)
 
     def water(self) -> None:
         """Draw reservoir, tailwater, silt on the deformed faces; a uniform pressure as arrows."""

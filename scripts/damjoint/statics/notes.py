@@ -57,8 +57,17 @@ def notes(case: Case) -> list[str]:
 
 def notes_on_settings(case: Case) -> list[str]:
     """Those that need no mesh: on settings without effect, unusual values, and loads."""
-    lists = () if case.geometry else lists_as_blocks(case, case.joint_names)
-    return [*settings_in_vain(case), *unusual_values(case), *loads_in_part(case), *lists]
+    of_section: list[str] = []
+    if not case.geometry:
+        lists = lists_as_blocks(case, case.joint_names)
+        of_section = [*overtopping(case, float(case["dam_height"])), *lists]
+    return [*settings_in_vain(case), *unusual_values(case), *loads_in_part(case), *of_section]
+
+
+def overtopping(case: Case, crest: float) -> Iterator[str]:
+    """Yield that the highest level is above the crest [m]."""
+    if case["rho_water"] and case["face_load"] == "hydrostatic" and max(case.levels) > crest:
+        yield f"the highest level is above the crest, {crest:g} m: the overflow acts as still water"
 
 
 def lists_as_blocks(case: Case, joints: Sequence[str]) -> Iterator[str]:
@@ -187,6 +196,7 @@ def notes_on_geometry(case: Case, mesh: Mesh) -> Iterator[str]:
             )
     if case["rho_water"]:
         _, top = geometry.reach
+        yield from overtopping(case, top)
         if level > top and case["crest_water"] and TOP not in sides:
             yield f"no face crest surface: no pressure on the crest (y = {top:g} m) below the water"
         if case["floor_water"] and not sides & {FLOOR, BED}:
