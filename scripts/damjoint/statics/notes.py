@@ -196,9 +196,10 @@ def notes_on_geometry(case: Case, mesh: Mesh) -> Iterator[str]:
             )
     if case["rho_water"]:
         _, top = geometry.reach
-        yield from overtopping(case, top)
         if level > top and case["crest_water"] and TOP not in sides:
             yield f"no face crest surface: no pressure on the crest (y = {top:g} m) below the water"
+        else:
+            yield from overtopping(case, top)
         if case["floor_water"] and not sides & {FLOOR, BED}:
             yield "floor_water = 1 has no effect: no face reservoir floor or tailwater bed"
     if case["silt_height"] > 0 and (UP not in sides or case["silt_height"] <= lowest[UP]):
