@@ -21,6 +21,7 @@ from closed_forms import (
 )
 from damjoint import RunError, runner
 from damjoint.input.resolve import load, varied
+from damjoint.joint.interface import interface_of
 from damjoint.solver import path
 from damjoint.solver.path import FALL
 from damjoint.statics import gravity
@@ -641,6 +642,20 @@ def test_water_that_enters_at_once_is_unstable_growth():
     for answer in answers:
         assert answer.confirmed and answer.mode == "unstable crack growth"
         assert min(answer.after.values()) > 1.2 * answer.value
+
+
+#: A dam of 20 m on a joint that releases its shear where it opens, point by point from 19.95 m on.
+RELEASED = {"dam_height": 20.24, "dam_base": 18.66, "dam_crest": 3.564, "n_joint": 40.0}
+RELEASED |= {"E_dam": 2.804e10, "E_found": 7.538e10, "nu": 0.1232, "law": "rupture", "alpha": 0.0}
+RELEASED |= {"K_N": 7.296e10, "K_T": 4.914e10, "sigma_max": 136.9e3, "pena_rupture": 10.22}
+RELEASED |= {"uplift": "cracked", "drain_x": 1.808, "drains": 1.0}
+
+
+def test_levels_are_prescribed_up_to_the_first_point_that_releases_its_shear():
+    """From a level beyond it the next unstable growth was taken for the first one, confirmed."""
+    case = load("dam", RELEASED, "6.072,20.24")
+    path = FailurePath(case, interface_of(case))
+    assert 18 < path.levels.max() < 19.947 and path.points[-1].last["slip_length"] == 0
 
 
 @pytest.mark.heavy
