@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -20,6 +20,12 @@ from ..threads import scipy_linalg
 #: Number of unknowns up to which the Laplace equation is solved by a dense matrix: scipy takes
 #: longer to load.
 DENSE = 300
+
+#: A series of resistances: its nodes, the resistance from its first node and from its last one to
+#: each of them, and that of the whole.
+Series: TypeAlias = tuple[IntArray, Array, Array, float]
+#: Most series that are kept.
+MOST_SERIES = 8
 
 #: No drains.
 NO_NODES = np.zeros(0, int)
@@ -311,6 +317,11 @@ class Flow:
             self.lengths = np.bincount(points.elements, points.weights)
             #: the lines cut at nodes of known heads, by the bytes of their mask: of the last ones
             self.cut_lines = lru_cache(maxsize=64)(self._cut_lines)
+            #: the last series of resistances by this mask, and of which conductivities
+            self.last_series: dict[bytes, tuple[Array, Array, list[Series]]] = {}
+            #: number of each node (n,) among the inner ones
+            self.inner = np.full(fields.nodes, -1)
+            self.inner[self.inside] = np.arange(len(self.inside))
         #: unit vectors along the lines or towards the toe at the Gauss points
         self.towards = self._along_lines() if fields.branched else self._towards_toe()
         if fields.dim == 3:
@@ -433,14 +444,9 @@ class Flow:
         No differences of nearly equal numbers, however large the ratio of the conductivities (a
         factorised matrix loses the closed joint beside the open one).
         """
-        resistance, cut = self.resistances(conductivity), self.cut_lines(known.tobytes())
-        drops, parts = np.zeros(len(resistance)), []
-        for cells, nodes in cut.pieces:
-            before, behind = np.zeros((2, len(nodes)))
-            of_part = resistance[cells]
-            np.cumsum(of_part, out=before[1:])
-            np.cumsum(of_part[::-1], out=behind[-2::-1])
-            parts.append((nodes, before, behind, before[-1]))
+        cut = self.cut_lines(known.tobytes())
+        resistance, parts = self.series(conductivity, known)
+        drops = np.zeros(len(resistance))
         ends, wholes = cut.ends, np.array([whole for *_, whole in parts])
         if cut.join:
             heads, differences = junction_heads(heads, known, ends, 1 / wholes)
@@ -461,12 +467,13 @@ class Flow:
 
         def inverse(coupling: Array) -> Array:
             """By the Green's function of each part; only Newton's tangent needs it."""
-            green = np.zeros((len(total),) * 2)
+            green = self._green_of_junctions(parts, known)
             for nodes, before, behind, whole in parts:
-                products = np.minimum.outer(before, before) * np.minimum.outer(behind, behind)
-                green[np.ix_(nodes, nodes)] += products / whole
-            green += self._green_of_junctions(parts, known)
-            return green[np.ix_(self.inside, self.inside)] @ coupling
+                at, inner = self.inner[nodes[1:-1]], slice(1, -1)
+                products = np.minimum.outer(before[inner], before[inner])
+                products *= np.minimum.outer(behind[inner], behind[inner])
+                green[np.ix_(at, at)] += products / whole
+            return green @ coupling
 
         inflow = np.zeros(len(total))
         np.add.at(inflow, ends, np.outer(differences / wholes, [-1, 1]))
@@ -482,22 +489,41 @@ class Flow:
         )
         return solution, inflow
 
-    def _green_of_junctions(
-        self, parts: list[tuple[IntArray, Array, Array, float]], known: BoolArray
-    ) -> Array:
-        """The part of the Green's function by the heads at branchings and closed ends (n, n)."""
-        number = len(known)
+    def series(self, conductivity: Array, known: BoolArray) -> tuple[Array, list[Series]]:
+        """2D: resistances of the elements, and the series of them between nodes of known heads and
+        branchings, see `_in_lines`; the last ones are kept.
+        """
+        mask = known.tobytes()
+        if mask in self.last_series and self.last_series[mask][0] is conductivity:
+            return self.last_series[mask][1:]
+        resistance, parts = self.resistances(conductivity), list[Series]()
+        for cells, nodes in self.cut_lines(mask).pieces:
+            before, behind = np.zeros((2, len(nodes)))
+            of_part = resistance[cells]
+            np.cumsum(of_part, out=before[1:])
+            np.cumsum(of_part[::-1], out=behind[-2::-1])
+            parts.append((nodes, before, behind, before[-1]))
+        if len(self.last_series) > MOST_SERIES:
+            self.last_series.clear()
+        self.last_series[mask] = conductivity, resistance, parts
+        return resistance, parts
+
+    def _green_of_junctions(self, parts: list[Series], known: BoolArray) -> Array:
+        """The part of the Green's function at the inner nodes (p, p) by the heads at branchings and
+        closed ends.
+        """
+        number, inner = len(known), len(self.inside)
         free = np.zeros(number, bool)
         free[[node for nodes, *_ in parts for node in nodes[[0, -1]]]] = True
         free &= ~known
         if not free.any():
-            return np.zeros((number, number))
+            return np.zeros((inner, inner))
         shapes, laplace = np.zeros((number, number)), np.zeros((number, number))
         for nodes, before, behind, whole in parts:
             pair = nodes[[0, -1]]
             laplace[np.ix_(pair, pair)] += np.array([[1, -1], [-1, 1]]) / whole
             shapes[nodes, pair[0]], shapes[nodes, pair[1]] = behind / whole, before / whole
-        shapes = shapes[:, free]
+        shapes = shapes[np.ix_(self.inside, free)]
         return np.asarray(shapes @ np.linalg.solve(laplace[np.ix_(free, free)], shapes.T))
 
     def matrix(self, conductivity: Array) -> Array:

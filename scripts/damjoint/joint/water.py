@@ -56,6 +56,19 @@ class Drainage:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Apertures:
+    """The apertures of the joints of a `WaterSystem`, one array for each."""
+
+    #: over that of the closed joint, and its derivative with the opening, see `JointWater.aperture`
+    factors: list[Array]
+    growth: list[Array]
+    #: of all joints, over that of the closed first one, times weights of the points (q,)
+    conductivity: Array
+    #: the drains of which a crack leaves a part
+    acting: list[Drainage]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Pressure:
     """Water pressure in the joint [Pa] at the law's points, at those of `JointWater.wetted` and at
     the nodes.
@@ -107,7 +120,8 @@ class JointWater:
         """The same, that exchanges water with no other joint, for a case with another law."""
         other = copy(self)
         other.case, other.law, other.system = case, case.law, copy(self.system)
-        other.system.members, other.system.last_solution = (other,), None
+        other.system.members = (other,)
+        other.system.last_solution = other.system.last_apertures = None
         return other
 
     def _along(self, matrix: CsrMatrix | None) -> tuple[Array, Array, Array]:
@@ -239,15 +253,15 @@ class JointWater:
         outlet = np.maximum(height, max(self.case["drain_level"], loading.tail))
         return self.nodes[nodes], outlet
 
-    def drainage(self, jump: Array, variables: Any) -> Drainage:
-        """What a crack leaves of the effect of the drains: the part of the elements beside them
-        that has not opened to the water.
+    def drainage(self, factor: Array, growth: Array) -> Drainage:
+        """What a crack leaves of the effect of the drains, by the `aperture`: the part of the
+        elements beside them that has not opened to the water.
         """
         assert self.drains
         _, beside = self.drains
         if self.case["uplift"] != "cracked":
             return Drainage(water=self, remaining=1.0, rate=np.zeros(len(beside)))
-        (factor, growth), most = self.aperture(jump, variables), self.case.shared["crack_most"][0]
+        most = self.case.shared["crack_most"][0]
         remaining = 1 - float(beside @ (factor - 1)) / most
         if remaining < ROUND_OFF:
             return Drainage(water=self, remaining=0.0, rate=np.zeros(len(beside)))
@@ -385,6 +399,9 @@ class WaterSystem:
         self.last_slowed: dict[tuple[int, int], Array] = {}
         #: the last solution in 2D, and of what: at the end of a step it is needed again
         self.last_solution: tuple[Array, tuple[Any, ...], FlowSolution] | None = None
+        #: likewise the last apertures, and of what: a derivative needs them again, as does the flow
+        #: at other levels
+        self.last_apertures: tuple[Array, tuple[Any, ...], Apertures] | None = None
         #: of the last loadings, see `_heads`
         self.heads = lru_cache(maxsize=4)(self._heads)
 
@@ -477,21 +494,9 @@ class WaterSystem:
         step: TimeStep | None,
         effect: float | None,
     ) -> FlowSolution:
-        opened = [water.opened(jump, variables, before_quake) for water in self.members]
-        factors = [water.aperture(*at)[0] for water, at in zip(self.members, opened, strict=True)]
-        conductivity = np.concatenate(
-            [
-                water.scale * factor**3 * water.joint.points.weights
-                for water, factor in zip(self.members, factors, strict=True)
-            ]
-        )
-        flow = FlowAtLoading(self, factors, loading)
-        all_drains = [
-            water.drainage(*at)
-            for water, at in zip(self.members, opened, strict=True)
-            if water.drains
-        ]
-        acting = [drains for drains in all_drains if drains.remaining]
+        at = self.apertures(jump, variables, before_quake)
+        conductivity, acting = at.conductivity, at.acting
+        flow = FlowAtLoading(self, at.factors, loading)
         if effect is None:
             effect = self.drain_effectiveness
         without, fully = step.of_parts if step and 0 < effect < 1 else (step, step)
@@ -511,6 +516,27 @@ class WaterSystem:
             return free.mixed(effect, flow.solve(conductivity, *drains, step))
         solved = partial(flow.solve, step=step)
         return self.with_fading(free, acting, effect, conductivity, loading, solved, before_quake)
+
+    def apertures(
+        self, jump: Array, variables: JointVariables, before_quake: BeforeQuake | None
+    ) -> Apertures:
+        """The apertures for the internal variables of all joints, see `solve`."""
+        given = variables, before_quake
+        if self.last_apertures:
+            at, of, apertures = self.last_apertures
+            if all(map(operator.is_, of, given)) and np.array_equal(at, jump):
+                return apertures
+        members = [(w, w.aperture(*w.opened(jump, *given))) for w in self.members]
+        conductivities = [w.scale * at[0] ** 3 * w.joint.points.weights for w, at in members]
+        drains = [water.drainage(*at) for water, at in members if water.drains]
+        apertures = Apertures(
+            factors=[factor for _, (factor, _) in members],
+            growth=[growth for _, (_, growth) in members],
+            conductivity=np.concatenate(conductivities),
+            acting=[line for line in drains if line.remaining],
+        )
+        self.last_apertures = jump.copy(), given, apertures
+        return apertures
 
     def with_fading(
         self,
@@ -690,18 +716,18 @@ class WaterSystem:
         frozen = [bool(before_quake and water.freezes_uplift) for water in self.members]
         if all(frozen) or not solution.systems:
             return None
-        apertures = [
-            water.aperture(*water.opened(jump, variables, before_quake)) for water in self.members
-        ]
+        at = self.apertures(jump, variables, before_quake)
         rates = [
-            (0 if unchanged else water.scale) * water.growing(*at) * water.joint.points.weights
-            for water, at, unchanged in zip(self.members, apertures, frozen, strict=True)
+            (0 if unchanged else water.scale) * water.growing(*one) * water.joint.points.weights
+            for water, one, unchanged in zip(
+                self.members, zip(at.factors, at.growth, strict=True), frozen, strict=True
+            )
         ]
         if step is None:
             return self.flow.derivative(solution, np.concatenate(rates))
         growth = [
             water.case["aperture_min"] * rate
-            for water, (_, rate) in zip(self.members, apertures, strict=True)
+            for water, rate in zip(self.members, at.growth, strict=True)
         ]
         stored = self.flow.points.weights * np.concatenate(growth) / step.seconds
         return self.flow.derivative(solution, self.reference * np.concatenate(rates), stored)
@@ -739,7 +765,7 @@ class FlowAtLoading:
         def flow_by(conductivity: Array) -> FlowSolution:
             return in_time(conductivity) if in_time else self.steady(conductivity, nodes, drained)
 
-        laminar = (system.reference if step else 1) * conductivity
+        laminar = system.reference * conductivity if step else conductivity
         if not system.turbulent.any():
             return flow_by(laminar)
         like = len(nodes), step.part if step else 0
