@@ -175,13 +175,18 @@ def getdp(scene: RandomQuake, run: Shaken, again: Again) -> Checked:
 def differences(run: Shaken, other: Shaken) -> float:
     """Return the largest difference between the rows of two engines over the largest value of a
     column, of the slips over the largest slip; inf with other time steps. The reference may stop,
-    where none of its steps converges: up to there.
+    where none of its steps converges, and does not halve the step of an impact: up to there.
     """
     rows, others = run.rows, other.rows
     count = len(others["time"])
     if other.files.stopped:
         rows = {name: column[:count] for name, column in rows.items()}
-    if len(rows["time"]) != count or np.abs(rows["time"] - others["time"]).max() > SAME_TIME:
+    common = min(len(rows["time"]), count)
+    other_steps = np.abs(rows["time"][:common] - others["time"][:common]) > SAME_TIME
+    first = int(np.argmax(other_steps)) if other_steps.any() else common
+    if first < common and first > 0 and rows["dt"][first] < others["dt"][first]:
+        rows, others = ({n: column[:first] for n, column in t.items()} for t in (rows, others))
+    elif len(rows["time"]) != count or first < count:
         return np.inf
     names = [n for n in others if not n.startswith(("iterations", "residual", "shear_reserve"))]
     slips = [name for name in names if name.startswith("slip")]
