@@ -23,11 +23,11 @@ from damjoint import RunError, runner
 from damjoint.input.resolve import load, varied
 from damjoint.joint.interface import interface_of
 from damjoint.solver import path
-from damjoint.solver.path import FALL
+from damjoint.solver.path import FALL, PRECISION
 from damjoint.statics import gravity
 from damjoint.statics.verdict import highest_by_statics, verdict
 from damjoint.studies import critical_value, failure_path
-from damjoint.studies.critical import Search
+from damjoint.studies.critical import SHORTER_RISE, Search
 from damjoint.studies.critical_study import critical, printed_lines, table
 from damjoint.studies.failure_path import FailurePath
 from variants import further
@@ -748,6 +748,21 @@ def test_a_path_begins_as_a_run_where_single_steps_do_not_lead(monkeypatch):
     monkeypatch.setattr(FailurePath, "advance", lambda self: setattr(self, "ended", True))
     _, answer = search_result("dam", settings=RUPTURE | NO_TENSION, levels="20")
     assert not answer.confirmed and "falls from the first equilibrium on, at 20 m" in answer.doubt
+
+
+def test_a_joint_that_loses_its_cohesion_is_repeated_to_half_of_the_precision(monkeypatch):
+    """Four confirmed levels of one dam were 1.13e-4 apart, each the same as its repetition."""
+    found = {}
+    again = lambda self, path, share, precision: found.update(share=share, precision=precision)
+    monkeypatch.setattr(Search, "from_beginning", again)
+    for sigma_max, part in ((0, 0.5), (1e5, 1.0)):
+        settings = {"law": "bond", "adhesion": 2.5e5, "sigma_max": sigma_max, "n_joint": 10}
+        search = Search(load("dam", settings | {"uplift": "cracked"}), "level")
+        whole = FailurePath(search.base, interface_of(search.base))
+        whole.starts = [0]  # passes over the end of a branch
+        assert whole.loses_cohesion == (not sigma_max)
+        search.repeated(whole)
+        assert found == {"share": SHORTER_RISE, "precision": part * PRECISION}
 
 
 #: A stiff, brittle mixed joint that the weight alone breaks (static loads of random quake 152-10).

@@ -349,7 +349,8 @@ class Search:
         None if they lead to the same highest level.
         """
         if repeats_whole(path):
-            return self.from_beginning(path, SHORTER_RISE)
+            precision = PRECISION / 2 if path.loses_cohesion else PRECISION
+            return self.from_beginning(path, SHORTER_RISE, precision=precision)
         other = path.repeated()
         if other:
             self.trials[-1] = replace(self.trials[-1], path=other)
@@ -368,12 +369,14 @@ class Search:
         share: float = 1.0,
         unstable_fall: float = FALL,
         case: Case | None = None,
+        precision: float = PRECISION,
     ) -> FailurePath | None:
         """The path by another way from its beginning on, to the first unstable growth if it is;
         None if it leads to the same highest level.
 
         share: of the level's rise that an increment aims at; unstable_fall: relative fall of the
-        level that is unstable growth; case: with other levels.
+        level that is unstable growth; case: with other levels; precision: relative, up to which
+        levels are the same.
         """
         rise, to_growth = share * path.rise, path.to_growth
         other = FailurePath(
@@ -387,7 +390,7 @@ class Search:
         if to_growth and other.starts:
             other = other.first_branch()
         other.refine()
-        differs = path.widen(other, PRECISION)
+        differs = path.widen(other, precision)
         other.interval = path.interval
         return other if differs else None
 
