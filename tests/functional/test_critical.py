@@ -339,10 +339,10 @@ def test_statics_confirms_a_level_near_its_bound(monkeypatch):
 
 def test_the_value_without_lasting_tension_is_given_too():
     """Tension c/mu of law = friction does not vanish on opening."""
-    settings = {"law": "friction", "adhesion": 1e6, "n_joint": 20.0}
+    settings = {"law": "friction", "adhesion": 5e5, "n_joint": 20.0}
     search, answer = search_result("dam", settings=settings)
     lines = "\n".join(printed_lines(answer, search))
-    assert "MPa (" in lines and "% of the overturning moment), at any opening" in lines
+    assert "kPa (" in lines and "% of the overturning moment), at any opening" in lines
     assert answer.gravity_with["without tension"] < answer.value
 
 
@@ -468,9 +468,9 @@ def test_a_level_beyond_unstable_growth_is_not_confirmed_if_other_ways_do_not_le
     }
     ways, follow = [], Search.from_beginning
 
-    def recorded(self, path, share=1.0, unstable_fall=FALL, case=None):
+    def recorded(self, path, share=1.0, unstable_fall=FALL, case=None, **precise):
         ways.append((id(path), share, unstable_fall, case and case.levels))
-        return follow(self, path, share, unstable_fall, case)
+        return follow(self, path, share, unstable_fall, case, **precise)
 
     monkeypatch.setattr(Search, "from_beginning", recorded)
     _, answer = search_result("dam", "level", settings, [2.285], "1.07")
@@ -644,6 +644,14 @@ def test_water_that_enters_at_once_is_unstable_growth():
         assert min(answer.after.values()) > 1.2 * answer.value
 
 
+def test_a_dam_that_stands_under_twice_its_height_has_no_critical_level():
+    """Its path ended at the limit of the levels, as an end of its branch."""
+    strong = {"law": "friction", "adhesion": 5e5, "uplift": "imposed", "n_joint": 8.0, "order": 1.0}
+    _, answer = search_result("dam", settings=strong | {"dam_height": 38.0}, levels="11.4")
+    assert answer.value is None and not answer.mode
+    assert answer.doubt == "there is an equilibrium at 75.99 m, twice the dam's height"
+
+
 #: A dam of 20 m on a joint that releases its shear where it opens, point by point from 19.95 m on.
 RELEASED = {"dam_height": 20.24, "dam_base": 18.66, "dam_crest": 3.564, "n_joint": 40.0}
 RELEASED |= {"E_dam": 2.804e10, "E_found": 7.538e10, "nu": 0.1232, "law": "rupture", "alpha": 0.0}
@@ -651,11 +659,15 @@ RELEASED |= {"K_N": 7.296e10, "K_T": 4.914e10, "sigma_max": 136.9e3, "pena_ruptu
 RELEASED |= {"uplift": "cracked", "drain_x": 1.808, "drains": 1.0}
 
 
-def test_levels_are_prescribed_up_to_the_first_point_that_releases_its_shear():
-    """From a level beyond it the next unstable growth was taken for the first one, confirmed."""
-    case = load("dam", RELEASED, "6.072,20.24")
-    path = FailurePath(case, interface_of(case))
-    assert 18 < path.levels.max() < 19.947 and path.points[-1].last["slip_length"] == 0
+@pytest.mark.heavy
+def test_a_point_that_levels_pass_over_is_no_confirmed_growth():
+    """By levels the point at 19.95 m is passed over, by increments of a displacement it is not: the
+    first unstable growth was there, or at 24.87 m, confirmed.
+    """
+    _, answer = search_result("dam", settings=RELEASED, levels="6.072,20.24")
+    assert not answer.confirmed
+    low, high = (float(number) for number in re.findall(r"\d+\.?\d*", answer.doubt)[:2])
+    assert low < 19.95 and high > 24.5
 
 
 @pytest.mark.heavy

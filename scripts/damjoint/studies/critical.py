@@ -72,6 +72,8 @@ MOST_REPEATED = 3
 SHORTER_RISE = 0.5
 #: First level of the path that begins lower, over that of the case [-].
 LOWER_BEGIN = 0.6
+#: The level up to which the levels are prescribed to pass over a growth, over that of the growth.
+ABOVE_GROWTH = 1.02
 #: Factor by which the fall that is unstable growth is changed, down and up [-]: it varies by a
 #: quarter with the increments.
 FALL_FACTOR = 1.35
@@ -289,7 +291,9 @@ class Search:
         levels, tails = self.case.levels[:last], self.case.tail_levels[:last]
         below = last < len(self.case.levels)
         case = varied(self.case, self.settings, levels, tails) if below else self.base
-        path = self.path(max(case.levels), case, case.highest_level, to_growth=True)
+        # not the limit itself, from which no increment leads on
+        most = (1 - PRECISION) * case.highest_level
+        path = self.path(max(case.levels), case, most, to_growth=True)
         paths = list[FailurePath]()
         for _ in range(MOST_REPEATED):
             path, grows = finished(path)
@@ -302,7 +306,7 @@ class Search:
             complete = [path for path in paths if not path.unfinished] or paths
             path, grows = finished(min(complete, key=lambda path: path.highest))
         if path.reached:
-            beyond = f"{path.target:g} m, twice the dam's height"
+            beyond = f"{path.target:.4g} m, twice the dam's height"
             return CriticalValue(
                 None, "", "", f"there is an equilibrium at {beyond}", path.points[-1]
             )
@@ -735,11 +739,22 @@ def repeats_whole(path: FailurePath) -> bool:
 
 def ways_over_growth(path: FailurePath, repeated: bool) -> list[Way]:
     """Ways that may end at another unstable growth: by shorter increments, unless the path has been
-    repeated so, with another fall of the level that counts as growth, and from a lower level.
+    repeated so, with another fall of the level that counts as growth, and from a lower level. A
+    point that releases its shear may be passed over by a step of the level, but by no increment of
+    a displacement: where it ends the path, also by levels up to above it, and by none.
     """
     ways: list[Way] = [] if repeated else [{"share": SHORTER_RISE}]
     ways += [{"unstable_fall": fall} for fall in (FALL / FALL_FACTOR, FALL * FALL_FACTOR)]
-    return [*ways, {"case": lower_begin(path.case)}]
+    ways.append({"case": lower_begin(path.case)})
+    case, levels = path.case, path.case.levels
+    if path.releases_shear and path.ended and path.has_last_loads(1.0):
+        tails = case.tail_levels
+        if sorted(levels) == list(levels):
+            ways.append({"case": varied(case, {}, (LOWER_BEGIN * levels[0],), tails[:1])})
+        above = ABOVE_GROWTH * path.highest
+        if max(levels) < above < case.highest_level:
+            ways.append({"case": varied(case, {}, (*levels, above), (*tails, tails[-1]))})
+    return ways
 
 
 def further_ways(path: FailurePath, repeated: bool, mechanism: bool) -> list[Way]:

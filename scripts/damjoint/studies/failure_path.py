@@ -110,8 +110,6 @@ class FailurePath(EquilibriumPath):
             for law in laws.laws
         )
         self.releases_shear = laws.releases_shear
-        if self.releases_shear:
-            self.most_softened = 0.0
         self.to_growth = to_growth and (self.releases_shear or (brittle and not self.entering))
         # after a step of the weight alone steps can be halved; else the first includes the weight
         if case["weight_first"] and stepper.weigh():
@@ -150,8 +148,6 @@ class FailurePath(EquilibriumPath):
                 if softens and length > smallest:
                     length /= 2
                     continue
-                if softens and self.releases_shear and self.on_path(point):
-                    return  # the point that does so may be unstable growth
                 for equilibrium in new:
                     self.add(equilibrium)
                 if softens:
@@ -409,12 +405,9 @@ def point_of(stepper: LoadStepper) -> Point:
 
 
 def softened(point: Point) -> float:
-    """The largest part of a joint that is open, softens or has released its shear."""
+    """The largest part of a joint that is open or softens."""
     equilibrium, parts = point.model.equilibrium, list[float]()
     for number, joint in enumerate(equilibrium.interface.joints):
         row = JointState(equilibrium, point.state, number).row
-        length = row["crack_length"] + row["process_zone"]
-        if equilibrium.laws.releases_shear:
-            length += row["slip_length"]
-        parts.append(length / joint.length)
+        parts.append((row["crack_length"] + row["process_zone"]) / joint.length)
     return max(parts)
