@@ -146,8 +146,8 @@ MUTATIONS = (
     Mutation(
         "square law for the cubic law of flow",
         "joint/water.py",
-        "water.scale * factor**3 * water.joint.points.weights",
-        "water.scale * factor**2 * water.joint.points.weights",
+        "w.scale * at[0] ** 3 * w.joint.points.weights",
+        "w.scale * at[0] ** 2 * w.joint.points.weights",
         having("uplift", "flow"),
     ),
     Mutation(

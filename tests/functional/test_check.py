@@ -536,6 +536,7 @@ def contents(folder):
     return {str(p.relative_to(folder)): p.read_text() for p in folder.rglob("*.csv")}
 
 
+@pytest.mark.heavy
 @pytest.mark.usefixtures("no_pictures")
 def test_combinations_in_several_processes_have_the_same_tables(command, tmp_path):
     cases = two_cases(tmp_path)

@@ -86,6 +86,7 @@ def test_sliding_level_without_cohesion(mu, levels, tails):
     assert answer.gravity == pytest.approx(level, abs=1e-3)
 
 
+@pytest.mark.heavy
 def test_strength_factor():
     """(mu N + c L) / T at 45 m; fracture energies are divided, too."""
     settings = DAM | {"law": "friction", "mu": 1.0, "adhesion": 2e5}
@@ -164,6 +165,7 @@ def test_a_wrong_first_estimate_is_followed_by_a_wider_search(monkeypatch):
     assert answer.mode == expected.mode and len(search.trials) < 30
 
 
+@pytest.mark.heavy
 def test_the_search_begins_beside_the_value_of_the_gravity_method():
     search, answer = search_result("dam", "mu", DAM | UNBONDED, tail_levels="3")
     _, beyond, before, *_ = [trial.value for trial in search.trials]
@@ -561,6 +563,7 @@ def test_a_toe_that_is_crushed_at_the_first_equilibrium_is_reported(command, tmp
     assert f"compression, {float(row['compression']) / 1e3:.4g} kPa" in out
 
 
+@pytest.mark.heavy
 def test_a_trial_that_is_crushed_at_once_fails(command):
     """The other quantities: the value before it stands."""
     words = "--set", "n_joint=10", "--set", "f_c=5e5", "--levels", "30", "--out", "out"
@@ -844,6 +847,7 @@ def test_sliding_is_repeated_by_shorter_increments_where_the_law_has_a_history(m
     assert answer.confirmed == (law == "friction")
 
 
+@pytest.mark.heavy
 def test_the_interval_has_the_highest_level_of_every_path(monkeypatch):
     """Each path by shorter increments ends lower than the one before."""
     tops = []

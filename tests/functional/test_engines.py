@@ -373,6 +373,7 @@ CROSS_JOINTS = {
 }
 
 
+@pytest.mark.heavy
 def test_runs_of_both_engines_agree_where_four_bodies_meet(tmp_path):
     """The crest is the end of a joint, too."""
     write_blocks(tmp_path / "own.msh", CROSS, CROSS_JOINTS, size=2.0, crest=5)
@@ -413,6 +414,7 @@ NETWORKS = {
 }
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("scene", further(4, NETWORKS))
 def test_runs_of_both_engines_agree_on_water_where_joints_meet(scene, tmp_path):
     write_blocks(tmp_path / "own.msh", BLOCKS, BLOCK_JOINTS)
@@ -426,6 +428,7 @@ def test_runs_of_both_engines_agree_on_water_where_joints_meet(scene, tmp_path):
     assert any(map(changed, result.joints))
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("uplift", further(1, ["flow", "imposed", ["flow", "imposed", "cracked"]]))
 def test_runs_of_both_engines_agree_while_water_reaches_a_second_heel(uplift, tmp_path):
     """That of the contraction joint, on the crest."""
@@ -437,6 +440,7 @@ def test_runs_of_both_engines_agree_while_water_reaches_a_second_heel(uplift, tm
     agree(load(str(tmp_path / "own.case"), settings, "5,9,12", "1,1,2"), tmp_path)
 
 
+@pytest.mark.heavy
 def test_networks_that_one_engine_can_not_compute_are_refused(tmp_path):
     """A second toe, on the crest; joints in 3D that do not lie side by side."""
     joints = BLOCK_JOINTS | {"contraction": (10, 0, 10, 10)}
@@ -451,6 +455,7 @@ def test_networks_that_one_engine_can_not_compute_are_refused(tmp_path):
         solve.check(load("monoliths", water))
 
 
+@pytest.mark.heavy
 def test_a_face_that_is_not_divided_where_bodies_meet_is_refused(tmp_path):
     """Its elements are those of a single curve of the mesh."""
     path, joints = tmp_path / "own.msh", {"base": (0, 0, 10, 0), "lift": (0, 5, 10, 5)}
@@ -554,6 +559,7 @@ IN_TIME = {
 }
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "scene",
     further(1, IN_TIME),

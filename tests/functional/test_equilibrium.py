@@ -56,6 +56,8 @@ def test_resultants_without_flow(solve, name, levels, tail_levels, settings):
             assert_allclose(history[key], value, rtol=1e-6, atol=1e-9 * scale, err_msg=key)
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "name", ["e", "g", *(pytest.param(name, marks=pytest.mark.heavy) for name in "fh")]
 )

@@ -64,6 +64,7 @@ def test_sigterm_ends_a_run_as_ctrl_c_does(tmp_path):
         os.killpg(process.pid, 0)
 
 
+@pytest.mark.heavy
 def test_an_interrupt_does_not_wait_for_a_long_mesh():
     """Nor is Gmsh used again before it is made."""
     made, handler = [], signal.signal(signal.SIGALRM, signal.default_int_handler)
@@ -204,6 +205,7 @@ def test_stress_ends_at_once_by_a_signal_to_its_group(tmp_path, after):
     assert not any((tmp_path / "tmp").iterdir())
 
 
+@pytest.mark.heavy
 def test_a_backend_that_matplotlib_does_not_know_is_not_used(tmp_path):
     """Pictures are files."""
     done = subprocess.run(
@@ -277,6 +279,7 @@ def test_a_second_run_in_a_locked_folder_is_refused(command, tmp_path):
     assert command(*RUN)[0] == 0
 
 
+@pytest.mark.heavy
 def test_a_second_sweep_into_a_locked_file_is_refused(command, tmp_path):
     words = "sweep", "c", *BARE[:-1], "--vary", "mu=0.5", "--out", "mu.csv"
     with (tmp_path / "mu.csv").open("a") as file:
@@ -286,6 +289,7 @@ def test_a_second_sweep_into_a_locked_file_is_refused(command, tmp_path):
     assert command(*words)[0] == 0
 
 
+@pytest.mark.heavy
 def test_a_damaged_run_json_is_reported(command, refused, tmp_path):
     assert command(*RUN)[0] == 0
     file = tmp_path / "out" / "c" / "run.json"
@@ -298,6 +302,8 @@ def test_a_damaged_run_json_is_reported(command, refused, tmp_path):
 NESTED = "[" * 100_000 + "]" * 100_000
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "old, new",
     further(
@@ -375,6 +381,7 @@ def test_a_report_does_not_replace_a_folder_or_a_file_of_a_run(command, refused,
     assert {p: p.read_bytes() for p in (tmp_path / "out" / "c").iterdir()} == before
 
 
+@pytest.mark.heavy
 def test_output_in_a_locale_without_the_letters_of_the_units(tmp_path):
     locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
     done = subprocess.run(
@@ -432,6 +439,7 @@ def test_too_little_memory_for_the_case_is_one_line(tmp_path, words):
     assert code == 1 and "memory" in err and len(err.splitlines()) == 1, err
 
 
+@pytest.mark.heavy
 def test_a_run_in_little_memory(tmp_path):
     assert limited(921_600_000, *RUN[:-3], "--levels", "6", cwd=tmp_path) == (0, "")
 
@@ -463,6 +471,7 @@ def test_mumps_out_of_memory_is_one_line(monkeypatch):
         factor.solve_symmetric(CsrMatrix.of_scipy(matrix), np.ones((3, 1)))
 
 
+@pytest.mark.heavy
 def test_a_closed_pipe_is_an_error_also_after_gmsh_has_started():
     """Gmsh sets SIGPIPE to the system's default, which ends the process without a word."""
     code = (
@@ -484,6 +493,8 @@ def test_a_getdp_run_that_exceeds_the_memory_is_refused(command, monkeypatch):
     assert code == 1 and "need about" in err and len(err.splitlines()) == 1
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "engine, streams",
     further(

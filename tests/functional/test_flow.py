@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 from variants import further
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("name, level, tail", [("e", 2, 0), ("g", 3, 1)])
 def test_flow_through_a_joint_of_uniform_aperture(solve, name, level, tail):
     """Aperture w: linear pressure, q = rho (p0 - pL) w^3 / (12 visc L)."""
@@ -68,6 +69,7 @@ def test_pressure_and_flux_follow_from_the_openings(solve, name, tolerance):
     )
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("name", ["e", "g"])
 @pytest.mark.parametrize("steps", further(1, [5, 20]))
 def test_monotone_filling_with_flow_does_not_depend_on_the_steps(solve, name, steps):
@@ -77,12 +79,14 @@ def test_monotone_filling_with_flow_does_not_depend_on_the_steps(solve, name, st
     )
 
 
+@pytest.mark.heavy
 def test_the_flux_is_the_cube_of_the_aperture(solve):
     """Closed joint."""
     q = [solve("e", "2", aperture_min=w)[0].history["flux"][-1] for w in (1e-8, 3e-8)]
     assert q[1] / q[0] == pytest.approx(27, rel=1e-6)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("slope", [0.0, 6.0])
 def test_water_up_to_a_waterstop(solve, slope):
     """In a lift joint, within an element: U as in the gravity method."""
@@ -95,6 +99,7 @@ def test_water_up_to_a_waterstop(solve, slope):
     assert not rows["p"][rows["s"] > 1.2].any()
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("engine", further(1, ["condensed", "getdp"]))
 @pytest.mark.parametrize("slope, level, tail", [(4, 5.3, 0), (4, 5.3, 5.35), (-4, 4.9, 4.8)])
 def test_no_water_enters_at_a_dry_end(tmp_path, engine, slope, level, tail):

@@ -88,6 +88,7 @@ class Slot:
         return self.system.fields.joint.surface.points[:, 0]
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("gap", [1e-4, 2e-3])
 def test_squeeze_film_with_a_sealed_tip(blocks, gap):
     """p = 6 eta V (L^2 - (L - x)^2) / w^3, thrust 4 eta V L^3 / w^3 [Reynolds 1886]."""
@@ -106,6 +107,7 @@ def test_squeeze_film_with_a_sealed_tip(blocks, gap):
     assert force == pytest.approx(4 * VISC * speed * L**3 / width**3, rel=5e-3)  # elements of 1 m
 
 
+@pytest.mark.heavy
 def test_slot_that_stores_water():
     """p0 erfc(x / (2 sqrt(D t))), D = w^3 N / (12 eta), after a sudden rise at the mouth."""
     storage, width = 1e-12, 1e-4
@@ -128,6 +130,7 @@ def test_slot_that_stores_water():
     assert entered == pytest.approx(by_hand, rel=1e-2)
 
 
+@pytest.mark.heavy
 def test_the_steady_limit():
     steady, slow = dam(), dam(time_unit=1e18)
     (first, second) = (stepper.run() for stepper in (steady, slow))
@@ -167,6 +170,7 @@ def test_the_steady_limit_of_networks(scene):
     assert steady.joint["p"].max() > 5e4
 
 
+@pytest.mark.heavy
 @ALL_SCENES
 def test_order_in_time_of_networks(scene):
     """Joints that open linearly in time and store water: halved steps halve the error."""
@@ -186,6 +190,7 @@ def test_order_in_time_of_networks(scene):
         assert fine > 1e-6 * np.abs(values).max()
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("lowest", [0.0, -1e5])
 @pytest.mark.parametrize("unit", further(1, [1.0, 600.0, 1e5]))
 def test_mass_is_kept_in_every_step(unit, lowest):
@@ -209,11 +214,13 @@ def test_mass_is_kept_in_every_step(unit, lowest):
         assert history["void"].max() > 1e-7 and history["p_min"].min() == pytest.approx(lowest)
 
 
+@pytest.mark.heavy
 def test_faster_floods_leave_the_crack_behind():
     cracks = [dam(time_unit=unit).run().last["crack_length"] for unit in (1.0, 600.0, 1e5)]
     assert cracks == sorted(cracks) and cracks[0] < cracks[-1]
 
 
+@pytest.mark.heavy
 def test_voids_are_filled_before_pressure_returns(blocks):
     """Opened faster than water follows, closed by less than the void: no pressure; then by more."""
     model = blocks(("flow", "none", "none"), aperture_min=1e-5, pressure_min=-5e4)
@@ -229,6 +236,7 @@ def test_voids_are_filled_before_pressure_returns(blocks):
     assert slot.stored.volume.sum() - slot.stored.inflow.sum() == pytest.approx(1e-4, rel=1e-9)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("uplift", [("flow", "flow", "none"), ("flow",) * 3])
 @pytest.mark.parametrize("storage", [0.0, 1e-12])
 def test_joints_that_meet_exchange_water(blocks, uplift, storage):
@@ -253,6 +261,7 @@ def test_joints_that_meet_exchange_water(blocks, uplift, storage):
         assert (above - below) / 2 == pytest.approx(expected, rel=1e-3, abs=1e-4 * np.ptp(expected))
 
 
+@pytest.mark.heavy
 def test_drains_take_water():
     drained, free = (
         dam(time_unit=600.0, drain_x=4.0, drains=on, drain_effectiveness=0.8).run() for on in (1, 0)
@@ -262,6 +271,7 @@ def test_drains_take_water():
     assert history["water"] - history["water_in"] == pytest.approx(2.8e-4, rel=1e-9)
 
 
+@pytest.mark.heavy
 def test_water_at_drains_of_part_effect():
     """A slot that fills: e times its pressure with drains of full effect plus 1 - e times that
     without drains, with steps of any length; in the end that of steady flow, to rounding.
@@ -289,6 +299,7 @@ def test_water_at_drains_of_part_effect():
     assert abs(part[0] - part[1]).max() < 0.05 * 30 * WATER
 
 
+@pytest.mark.heavy
 def test_in_three_dimensions():
     """A slice has the pressures of the section, and keeps its water."""
     settings = {"n_joint": 10.0, "order": 1.0, "mesh_pattern": "layers", "time_unit": 600.0}
@@ -298,6 +309,7 @@ def test_in_three_dimensions():
         assert solid.history[name][-1] == pytest.approx(flat.history[name][-1], rel=2e-2)
 
 
+@pytest.mark.heavy
 def test_flow_beyond_laminar_is_said():
     """2 rho q / eta over 2000: of the steady run by the leakage, in time by the largest flow."""
     for settings in ({}, {"time_unit": 600.0}):
@@ -319,6 +331,7 @@ def test_a_dry_end_has_no_suction():
     assert runs[0].last["N"] == pytest.approx(runs[1].last["N"], rel=1e-12)
 
 
+@pytest.mark.heavy
 def test_a_dry_end_gives_no_water_to_drains_below_it():
     """Air enters at a dry toe, however its head is rounded: the drains empty the joint."""
     size = {"dam_height": 6.71, "dam_base": 5.3, "dam_crest": 0.414, "aperture_min": 8.85e-5}
@@ -332,6 +345,7 @@ def test_a_dry_end_gives_no_water_to_drains_below_it():
         assert len(beyond) > 4 and (beyond < -1).all()
 
 
+@pytest.mark.heavy
 def test_water_flows_in_time_in_a_lift_only():
     """Whatever the uplift of the first joint; picture and report name the lift."""
     lifts = {"lift_heights": (15.0,), "uplift": ("none", "flow"), "n_joint": 8.0, "order": 1.0}
@@ -343,6 +357,7 @@ def test_water_flows_in_time_in_a_lift_only():
     assert f"Water in lift 15 m at the end: {1e3 * results.last['water_2']:.4g} l/m" in text
 
 
+@pytest.mark.heavy
 def test_steady_before_the_start():
     """As steady flow up to the level of `time_start`, then slower than it."""
     steady, late = dam(), dam(time_unit=60.0, time_start=1.0)
@@ -351,6 +366,7 @@ def test_steady_before_the_start():
     assert second.history["crack_length"][-1] < first.history["crack_length"][-1]
 
 
+@pytest.mark.heavy
 def test_steps_are_halved_where_pressure_moves_too_far():
     """Then no step changes it by more; the history counts the halvings."""
     most = 2e4
@@ -409,6 +425,7 @@ def test_a_film_without_compressibility_in_steps_of_milliseconds():
     assert not run.stopped and not run.history["cuts"].any()
 
 
+@pytest.mark.heavy
 def test_a_sealed_joint_must_store_water(blocks, tmp_path, capsys):
     """The base of the middle one of three blocks, between dry joints: its volume is given."""
     bounds = {"left": (0, 5), "middle": (5, 10), "right": (10, 15)}

@@ -19,6 +19,8 @@ SMALL = ("--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4")
 BARE = (*SMALL, "--no-fields", "--no-picture")
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize("engine", [pytest.param("getdp", marks=pytest.mark.heavy), "condensed"])
 def test_files_of_the_user_in_the_folder_stay(command, tmp_path, engine):
     """Also in work/ and fields/, beside an earlier run."""
@@ -38,6 +40,8 @@ def test_files_of_the_user_in_the_folder_stay(command, tmp_path, engine):
     assert all((tmp_path / "out" / name).read_text() == "mine" for name in mine)
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "words",
     [
@@ -60,6 +64,7 @@ def test_the_getdp_engine_accepts_any_folder_name(command, tmp_path, words):
     ]
 
 
+@pytest.mark.heavy
 def test_results_of_an_earlier_run_are_removed(command, tmp_path):
     """Displacement control, two uplifts and three levels; then level control with one level."""
     words = "run", "a", *SMALL, "--out", "out"
@@ -82,6 +87,7 @@ def test_bad_input_leaves_an_earlier_run_unchanged(command, tmp_path):
     assert {p: p.read_bytes() for p in (tmp_path / "out").iterdir()} == before
 
 
+@pytest.mark.heavy
 @pytest.mark.usefixtures("no_pictures")
 @pytest.mark.parametrize(
     "newer",
@@ -121,6 +127,7 @@ def test_two_checks_into_one_folder_are_refused(command, tmp_path):
     assert code == 2 and "another damjoint is writing to it" in err
 
 
+@pytest.mark.heavy
 def test_a_search_that_fails_removes_the_value_of_an_earlier_one(command, tmp_path, monkeypatch):
     words = "critical", "c", "--set", "n_joint=10", "--out", "out"
     assert command(*words)[0] == 0 and (tmp_path / "out" / "critical.csv").is_file()
@@ -162,6 +169,7 @@ def test_a_study_that_ends_without_results_says_where_and_when(
     assert any(note.startswith("rho_dam = 24 ") for note in info["notes"])
 
 
+@pytest.mark.heavy
 def test_a_removal_that_is_interrupted_is_completed_by_the_next_run(command, tmp_path, monkeypatch):
     """run.json, by which files are damjoint's, is removed last."""
     words = "run", "c", *SMALL, "--levels", "6", "--out", "out"
@@ -364,6 +372,7 @@ def test_a_wrong_version_of_getdp_leaves_an_earlier_run_unchanged(
     assert {p: p.read_bytes() for p in (tmp_path / "out/c").iterdir()} == before
 
 
+@pytest.mark.heavy
 def test_no_temporary_file_of_getdp_remains(command, tmp_path, monkeypatch):
     """Nor of Open MPI."""
     (tmp_path / "tmp").mkdir()
@@ -385,6 +394,7 @@ def test_a_run_that_fails_early_removes_the_results_of_an_earlier_one(command, t
     assert record["state"] == "failed" and record["statement"] in err
 
 
+@pytest.mark.heavy
 def test_a_title_may_be_long_and_contain_dollar_signs(command, tmp_path):
     (tmp_path / "ssnp142.case").write_text((CASES / "ssnp142.case").read_text())
     title = "costs $5_{ and $6 " * 12

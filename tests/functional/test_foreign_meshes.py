@@ -61,6 +61,7 @@ def assert_same(mesh, expected):
         assert middles[0] == pytest.approx(middles[1], abs=1e-6)
 
 
+@pytest.mark.heavy
 def test_a_med_file_keeps_its_groups(drawn):
     if "Med" not in gmsh.option.getString("General.BuildOptions").split():
         pytest.skip("this Gmsh is built without MED")

@@ -56,6 +56,7 @@ def press_run(folder, changed):
     return [row[name] for name in SEEN]
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "words, message",
     further(
@@ -91,6 +92,7 @@ def test_impossible_sections_are_refused_before_the_run(project, words, message)
     assert done.returncode and not (project / "res").exists()
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "text, message",
     further(
@@ -260,6 +262,7 @@ def test_files_that_are_made_are_current(name, tmp_path):
         assert (tmp_path / f"{name}.{kind}").read_text() == stored
 
 
+@pytest.mark.heavy
 def test_another_dimension_is_refused(project):
     """The regions of a geometry of one's own are those of one dimension."""
     command = [
@@ -299,6 +302,7 @@ def shake_in_gmsh(project, name, record, settings):
     run_in_gmsh(project, name, coarse | settings)
 
 
+@pytest.mark.heavy
 def test_a_dam_that_fails_by_the_earthquake_is_red(project):
     """The pulse breaks the joint, whose friction alone does not hold the dam at rest."""
     record = "record_x() = {0, 0, 0.1, 9, 0.2, 0}; record_y() = {0, 0, 0.2, 0};\n"
@@ -309,6 +313,7 @@ def test_a_dam_that_fails_by_the_earthquake_is_red(project):
     assert "'fails in earthquake', " in status and "Tomato" in status
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "name, given, steps",
     further(
@@ -335,6 +340,7 @@ def test_an_earthquake_has_the_time_step_of_its_problem(project, name, given, st
         assert points == pytest.approx([float(row.split()[1]) for row in rows])
 
 
+@pytest.mark.heavy
 def test_an_earthquake_of_a_solid_geometry_of_its_own_is_refused(project):
     """The engine has it for parametric sections, and in 2D."""
     path = project / "valley.pro"

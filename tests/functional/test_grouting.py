@@ -28,6 +28,7 @@ def block():
     return Space(body, 2), Space(Body(points[face], face, [("line", line)], np.arange(N)), 2)
 
 
+@pytest.mark.heavy
 def test_published_openings_of_a_grouted_joint():
     """Two mirrored blocks, fixed at their base; weight at t = 1, grouted at 2, compared at 3."""
     space, face = block()

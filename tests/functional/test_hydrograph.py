@@ -58,6 +58,7 @@ def test_levels_beside_a_hydrograph_are_refused(tmp_path):
         hydrograph.read(tmp_path / "none.csv")
 
 
+@pytest.mark.heavy
 def test_a_flood_with_picture_and_report(command, tmp_path, monkeypatch, texts_drawn):
     """The example with few elements: water stays behind in the crack that closes."""
     monkeypatch.chdir(tmp_path)

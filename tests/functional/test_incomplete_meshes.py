@@ -324,6 +324,7 @@ def test_a_complete_mesh_may_be_elsewhere(plane, written, by):
     assert notes(case) == [] and mesh_of(case).user_geometry.height == pytest.approx(45)
 
 
+@pytest.mark.heavy
 def test_the_critical_level_of_a_complete_mesh(plane, written, command):
     """The search has no highest level. The heel is at 560 m above the sea."""
     path = written(plane.moved((0, 560, 0)), "default_pena_tang = 0; default_order = 1;")
@@ -386,6 +387,7 @@ def test_a_mesh_in_3d_with_a_defect_is_refused(solid, written, name):
     assert message in str(error.value)
 
 
+@pytest.mark.heavy
 def test_what_a_mesh_in_3d_lacks_is_noted(solid, written):
     assert notes(load(written(solid, SPACE))) == []
     (found,) = notes(load(written(without("upstream")(solid), SPACE)))
@@ -398,6 +400,7 @@ def test_what_a_mesh_in_3d_lacks_is_noted(solid, written):
     assert f"weight 619.8 MN; under water: {under}" in understood(load(written(solid, SPACE)))
 
 
+@pytest.mark.heavy
 def test_a_support_or_load_without_a_region_is_refused(solid, plane, written):
     """It would not act."""
     mesh = replace(solid, regions={n: r for n, r in solid.regions.items() if n != "z faces"})
@@ -413,6 +416,7 @@ BLOCK = {"body": (0.0, 0.0, 10.0, 10.0)}
 BASE, CRACK = {"base": (0, 0, 10, 0)}, {"crack": (3, 5, 7, 5)}
 
 
+@pytest.mark.heavy
 def test_a_crack_with_a_gap_is_refused(tmp_path):
     path = write_blocks(tmp_path / "own.msh", BLOCK, BASE | CRACK)
     (tmp_path / "own.case").write_text('geometry = "own.msh"; levels() = {5};')
@@ -436,6 +440,7 @@ def is_line(text, group):
     return len(words) == 7 and words[1] == "1" and words[3] == group
 
 
+@pytest.mark.heavy
 def test_a_point_of_two_groups_is_one_element(tmp_path):
     """Format MSH 2.2 has it twice, once for each group: a force on it would be twice as large."""
     path = write_blocks(tmp_path / "own.msh", BLOCK, BASE)

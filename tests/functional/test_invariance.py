@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from variants import further
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("name", ["a", "c"])
 def test_order_1_converges_to_order_2(solve, name):
     """At half the element size half the difference or less; well inside the joint below 0.3 %."""
@@ -38,6 +39,7 @@ def test_3d_is_equal_to_2d(solve, name, flat, solid):
     assert_allclose(three.history["crest_ux"], two.history["crest_ux"], rtol=5e-3)
 
 
+@pytest.mark.heavy
 def test_split_layers_contain_the_plane_solution(solve):
     """Order 2, one layer as thick as the joint is long: as accurate as 2D, and close to it."""
     size = {"n_joint": 20, "h_dam": 2, "h_found": 3, "order": 2, "uplift": "imposed", "nu": 0.25}
@@ -47,6 +49,7 @@ def test_split_layers_contain_the_plane_solution(solve):
     assert_allclose(three.history["crest_ux"], two.history["crest_ux"], rtol=2e-3)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "order, pattern, bound", [(1, "layers", 1e-9), (2, "layers", 1e-9), (2, "split", 5e-3)]
 )
@@ -105,6 +108,7 @@ def test_monotone_filling_does_not_depend_on_the_steps(solve, name, steps):
     assert max(differences(one, other)) < 1e-6
 
 
+@pytest.mark.heavy
 def test_emptying_depends_little_on_the_steps(solve):
     """Friction, 6, 9, 2, 8 m: where the heel closes again, its slip is that of the step before, so
     the shear there depends on the steps; the openings hardly do.

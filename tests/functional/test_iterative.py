@@ -57,6 +57,8 @@ def assert_same(one, other):
             assert_allclose(other.history[name], expected, rtol=0, atol=1e-6 * scale, err_msg=name)
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "law, uplift",
     [
@@ -123,6 +125,7 @@ def test_few_iterations_whatever_the_joint_carries(both, state, monkeypatch):
     assert iterations <= 60
 
 
+@pytest.mark.heavy
 def test_bodies_are_free_to_move_as_rigid_ones():
     bodies = Bodies.of(load("dam", SOLID)).without_supports
     for body in bodies.by_name.values():
@@ -146,6 +149,7 @@ def test_fields_of_both_ways():
             assert_allclose(other[name], expected, rtol=0, atol=1e-6 * scale, err_msg=of)
 
 
+@pytest.mark.heavy
 def test_the_choice_follows_size_steps_and_memory(monkeypatch):
     def iterates(steps):
         return memory.iterates(load("dam", SOLID, "40", steps=steps), bodies)

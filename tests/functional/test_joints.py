@@ -40,6 +40,7 @@ def solved(levels, case="dam", **settings):
     return LoadStepper(case, interface_of(case)).run()
 
 
+@pytest.mark.heavy
 def test_elements_of_a_coarse_joint_below_a_fine_crest():
     """The joint's size holds where that of the crest is smaller."""
     lift = COARSE | {"n_joint": 10.0, "lift_heights": (15.0,)}
@@ -47,6 +48,7 @@ def test_elements_of_a_coarse_joint_below_a_fine_crest():
     assert fine == equal
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("uplift", ["none", "imposed"])
 def test_resultants_of_each_joint_are_those_of_statics(uplift):
     results = solved([30, 42], uplift=uplift, K_N=(1e11, 2e11, 5e10, 1e12), **SLOPES)
@@ -62,6 +64,7 @@ def test_resultants_of_each_joint_are_those_of_statics(uplift):
             )
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("pattern", ["layers", "free"])
 def test_resultants_of_each_joint_in_3d(pattern):
     solid = {"dim": 3.0, "mesh_pattern": pattern, "n_joint": 8.0, "thickness": 6.0}
@@ -83,6 +86,8 @@ def test_gravity_method_lift_by_lift(joint):
     assert np.allclose([block.N, block.T, block.M], exact, rtol=1e-9, atol=0)
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "weakest", [3, *(pytest.param(k, marks=pytest.mark.heavy) for k in (1, 2))]
 )
@@ -107,6 +112,7 @@ def test_lowest_closed_form_of_friction_joints_fails_and_is_named(weakest):
     assert results.last["level"] == pytest.approx(exact[name], rel=1e-3)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("hardening, fails", [((-1.0, 1e9), False), ((1e9, -1.0), True)])
 def test_a_joint_slides_on_a_hardening_that_is_not_set_for_it(tmp_path, hardening, fails):
     """The lift at 25 m slips along its whole length, T > mu N; its own pena_tang decides."""
@@ -124,6 +130,7 @@ def test_a_joint_slides_on_a_hardening_that_is_not_set_for_it(tmp_path, hardenin
     assert Search(case, "level").settings["pena_tang"] == used
 
 
+@pytest.mark.heavy
 def test_strong_joints_tend_to_the_monolith():
     """The crest's displacement, with an error of first order in the joints' compliance."""
     crest = []
@@ -176,6 +183,7 @@ def test_the_joint_of_the_least_factor_speaks_for_a_dam_that_stands():
     assert run_picture.facts_of(results)[1].startswith("lift 12 m: ")
 
 
+@pytest.mark.heavy
 def test_a_run_is_read_as_it_was_written(tmp_path):
     from damjoint import runner
 
@@ -254,6 +262,7 @@ def test_a_case_file_with_lists(tmp_path):
         load(str(path))
 
 
+@pytest.mark.heavy
 def test_the_mesh_of_one_joint_does_not_depend_on_an_earlier_mesh_of_several():
     one, several = load("dam", COARSE), load("dam", COARSE | {"lift_heights": LIFTS})
     before, _, after = Mesh(one), Mesh(several), Mesh(one)

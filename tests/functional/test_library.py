@@ -93,6 +93,7 @@ def test_an_import_loads_nothing_else():
         _ = dj.nothing
 
 
+@pytest.mark.heavy
 def test_tables_are_those_of_the_command(run, tmp_path):
     """Record arrays with the columns and values of the files that `save` writes."""
     run.save(tmp_path / "out")
@@ -130,6 +131,7 @@ def test_readable_names_are_those_of_columns(run):
         np.testing.assert_array_equal(getattr(rows, name), rows[column])
 
 
+@pytest.mark.heavy
 def test_tables_for_pandas_and_xarray(run):
     """The same numbers; units and dimensions in xarray."""
     frame = run.to_pandas("history")
@@ -147,6 +149,7 @@ def test_tables_for_pandas_and_xarray(run):
         run.to_pandas("curve")
 
 
+@pytest.mark.heavy
 def test_frames_have_the_units_of_their_columns(run, quaked):
     """Of every study; the same as in the tables' documentation."""
     case = dj.case("dam", **CASE, law="friction", adhesion=0.0)
@@ -236,6 +239,7 @@ def test_names_of_cases_and_records_stay_in_their_variations(tmp_path):
         dj.sweep("dam", quake=0.05, record=[tmp_path / "wave.csv"], jobs=1)
 
 
+@pytest.mark.heavy
 def test_history_of_several_joints_for_xarray():
     size = {"n_joint": 10, "h_dam": 17, "h_found": 60}
     lifts = dj.run(dj.case("dam", levels=[30.0], lift_heights=[15.0], **size))
@@ -357,6 +361,8 @@ def test_check_and_critical_are_those_of_the_commands(command, tmp_path):
         dj.critical("dam", of="uplift", levels=40, n_joint=20)
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize("accuracy", [None, pytest.param("10%", marks=pytest.mark.heavy)])
 @pytest.mark.usefixtures("no_pictures")
 def test_a_sweep_is_that_of_the_command(command, tmp_path, monkeypatch, accuracy):

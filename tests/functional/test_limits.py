@@ -134,6 +134,7 @@ def test_displacement_control_from_an_empty_reservoir(solve, weight_first):
     assert filled.heel[-1] == pytest.approx(driven.heel[-1], rel=1e-6)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "by, settings, nearly", [(-1e-7, {}, 0), (1e-3, {"sigma_max": 1e7, "uplift": "none"}, 20)]
 )

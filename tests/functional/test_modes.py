@@ -71,6 +71,7 @@ def test_water_and_elastic_rock_lower_the_frequencies():
     assert found.table["frequency"].tolist() == [wet, wet_rigid, dry, dry_rigid]
 
 
+@pytest.mark.heavy
 def test_the_command_writes_rows_picture_and_run_json(painted, command, tmp_path):
     few = "--set", "n_joint=10", "--set", "order=1", "--levels", "30,40", "--number", "2"
     code, out, err = command("modes", "dam", *few)

@@ -62,6 +62,7 @@ def test_a_mutation_is_noticed(name, finding, monkeypatch):
     assert row["scene"] and finding in row["finding"], row
 
 
+@pytest.mark.heavy
 def test_what_changes_nothing_is_not_noticed(monkeypatch, tmp_path):
     """The same text, in one scene."""
     monkeypatch.setenv("PYTHONPATH", "")

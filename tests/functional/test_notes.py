@@ -45,6 +45,7 @@ def mine(tmp_path, command, no_pictures):
     return write
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_prints_the_notes(command, mine, name):
     mine("default_rho_dam = 24; default_G_t = 500; levels() = {9};")
@@ -72,6 +73,7 @@ def test_a_sweep_prints_the_notes_on_its_rows(command, mine):
     assert err.count(" is unusual ") == err.count(" has no effect") == 1
 
 
+@pytest.mark.heavy
 def test_notes_are_stored_and_reported(command, mine, tmp_path):
     mine("default_G_t = 500; levels() = {9};")
     note = "G_t has no effect; it needs law = bond"
@@ -99,6 +101,7 @@ def test_a_run_prints_what_it_understood_of_a_geometry(command, tmp_path):
     assert err == f"damjoint: stepped: {note}\n" and "upstream 30 of 45 m" in note
 
 
+@pytest.mark.heavy
 def test_settings_of_a_preset_cause_no_note(command, mine):
     """But the user's own do, before or after it."""
     preset = 'Include "presets/usace_uplift.case"; levels() = {9};'
@@ -219,6 +222,7 @@ def test_the_list_of_the_wrong_length_is_blamed(refused, settings, message):
     assert message in line and "(3: upstream base, downstream base, contraction)" in line
 
 
+@pytest.mark.heavy
 def test_a_single_list_of_the_wrong_length_is_blamed(refused):
     """Where no other list tells the number of joints."""
     line = refused("run", "stepped", "--set", "mu=0.6,0.7")
@@ -235,6 +239,7 @@ def test_the_water_of_an_earthquake_needs_uplift(command, mine, uplift, noted):
     assert "k_h" not in err
 
 
+@pytest.mark.heavy
 def test_flow_in_time_that_begins_after_the_loading(command, mine, tmp_path):
     """Is steady, as the note says, and has no picture of water in time."""
     mine('default_uplift = "flow"; default_time_unit = 60; default_time_start = 5; levels() = {9};')

@@ -56,6 +56,7 @@ def test_a_table_of_all_steps_is_written_on_demand(command, tmp_path):
     assert code == 2 and error.endswith("--all-steps: must not be given with --engine getdp\n")
 
 
+@pytest.mark.heavy
 def test_a_matplotlibrc_in_the_current_folder_has_no_effect(tmp_path):
     (tmp_path / "matplotlibrc").write_text("axes.facecolor: red\nfont.size: 40\n")
     script = (
@@ -91,6 +92,7 @@ def folder(ran):
     return ran[0]
 
 
+@pytest.mark.heavy
 def test_a_run_prints_what_each_level_has(ran):
     out = ran[1]
     assert "uplift imposed: stands; 4 steps" in out and "uplift none: stands; 4 steps" in out
@@ -172,6 +174,7 @@ def test_fields_for_paraview(folder):
             assert np.all(mesh.cell_data["body"][0] == number)
 
 
+@pytest.mark.heavy
 def test_blocks_for_paraview_have_the_names_of_joints_and_times_are_levels_that_rise(
     command, tmp_path
 ):
@@ -194,6 +197,7 @@ def test_blocks_for_paraview_have_the_names_of_joints_and_times_are_levels_that_
     assert {time for time, _ in collection(fields)} == {1, 2}
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("engine", ["condensed", "getdp"])
 def test_the_points_of_each_joint_move_with_the_body_below_it(command, tmp_path, engine):
     """Above it the displacement is larger by the jump: x, y of a horizontal joint."""
@@ -217,6 +221,7 @@ def test_the_points_of_each_joint_move_with_the_body_below_it(command, tmp_path,
         assert np.abs(at_joint).max() > 1e-4
 
 
+@pytest.mark.heavy
 def test_cells_of_order_2_have_their_midpoints(command, tmp_path):
     """Quadratic cells of VTK, the displacement at their further nodes that of the finite elements:
     the moment about the toe balances the weight's as curved sides do. Read back, only corners.
@@ -305,6 +310,7 @@ def test_fields_for_gmsh(folder):
         gmsh.clear()
 
 
+@pytest.mark.heavy
 def test_flux_in_the_fields(command, tmp_path):
     small = "--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4"
     assert command("run", "e", *small, "--levels", "6", "--no-picture")[0] == 0
@@ -337,6 +343,7 @@ def test_a_hint_reports_a_joint_too_stiff_for_its_mesh(command, tmp_path):
     assert record["hints"][0] in out and "oscillate" in record["hints"][0]
 
 
+@pytest.mark.heavy
 def test_a_run_imports_no_library_that_it_does_not_need(tmp_path):
     """Optimisation, statistics and plotting take longer to import than a short run takes."""
     words = ["run", "c", "--no-fields", "--no-picture", "--out", str(tmp_path / "out")]
@@ -347,6 +354,7 @@ def test_a_run_imports_no_library_that_it_does_not_need(tmp_path):
     assert done.stdout.splitlines()[-1] == "[]"
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("law", ["rupture", "bond", "friction"])
 def test_length_of_the_fracture_process_zone(command, tmp_path, law):
     """No crack yet, but metres of softening: the integral over the Gauss points is, to an element,

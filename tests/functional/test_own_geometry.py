@@ -92,6 +92,7 @@ def test_both_engines_agree_on_a_bent_joint(tmp_path, uplift):
         assert other[column] == pytest.approx(one[column], rel=0, abs=1e-6 * size), column
 
 
+@pytest.mark.heavy
 def test_the_coordinate_s_follows_the_joint(solve):
     (result,) = solve("stepped", "20", "0", uplift="none")
     rows = result.at()

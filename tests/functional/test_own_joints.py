@@ -44,6 +44,7 @@ def solved(tmp_path):
     return run
 
 
+@pytest.mark.heavy
 def test_a_strong_second_joint_tends_to_the_run_without_it(solved):
     """On the same mesh, with an error of first order in its compliance."""
     law = {"sigma_max": 1e4, "law": "bond", "adhesion": 5e4}
@@ -80,6 +81,7 @@ def test_an_open_contraction_joint_parts_two_dams(solved):
     assert joints_note(result.case).startswith("(SSF): between bodies that other joints hold")
 
 
+@pytest.mark.heavy
 def test_a_stiff_contraction_joint_glues_two_blocks(solved):
     stiff = {"K_N": (1e11, 1e11, 1e16), "K_T": (5e10, 5e10, 1e16), "adhesion": 1e30}
     two = solved(BLOCKS, BASES | CONTRACTION, [5], **(FRICTION | stiff))
@@ -91,6 +93,7 @@ def test_a_stiff_contraction_joint_glues_two_blocks(solved):
         assert np.allclose(own.at()["sigma_n"], other.at()["sigma_n"], rtol=0, atol=1)
 
 
+@pytest.mark.heavy
 def test_blocks_of_different_friction_share_the_thrust(solved):
     """A smooth contraction joint transmits thrust only: both slide where it is mu_1 W + mu_2 W; the
     water stands above the crest, on which it does not press here.
@@ -104,6 +107,7 @@ def test_blocks_of_different_friction_share_the_thrust(solved):
     assert thrust == pytest.approx(0.5 * WEIGHT, rel=1e-4)
 
 
+@pytest.mark.heavy
 def test_slip_of_an_inclined_crack_inside_a_body(solved):
     """Under 100 MPa along x, at 20 degrees to it, with a friction of 30 degrees: 4 (1 - nu^2) tau b
     sqrt(1 - (x/b)^2) / E, with tau the shear stress less the friction, b half of the length.
@@ -139,6 +143,7 @@ def test_slip_of_an_inclined_crack_inside_a_body(solved):
         getdp.check(results.case)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("dim", [2, 3])
 def test_monoliths_are_in_equilibrium(dim):
     """The bases carry the thrust and the weight less the uplift."""
@@ -157,6 +162,7 @@ def test_monoliths_are_in_equilibrium(dim):
         assert bases[1].last["T"] == pytest.approx(contraction.last["N"], rel=1e-6)
 
 
+@pytest.mark.heavy
 def test_water_enters_no_joint_at_the_downstream_face():
     """Above its end there, 31 m, too: the joint is wet up to the head of the base."""
     low, high = (
@@ -189,6 +195,7 @@ def test_an_end_beside_the_water_that_it_has_is_noted(tmp_path):
             assert found == (expected if uplift == "imposed" else [])
 
 
+@pytest.mark.heavy
 def test_lateral_forces_of_each_monolith_balance():
     """Without a load along z: what its base carries is what its contraction joint presses."""
     case = load("monoliths", {"dim": 3.0, "n_joint": 10.0, "h_dam": 10.0, "h_found": 30.0}, [45.0])
@@ -253,6 +260,7 @@ def test_each_block_of_a_dam_across_a_valley_is_in_equilibrium():
     assert figure.get_figheight() > len(results.joints) * PER_JOINT
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("order", further(1, [1.0, 2.0]))
 @pytest.mark.parametrize("waterstop", [0.0, 0.7, pytest.param(3.0, marks=pytest.mark.heavy)])
 def test_water_in_a_contraction_joint_up_to_its_waterstop(waterstop, order):

@@ -149,6 +149,7 @@ def test_the_highest_level_of_a_run_does_not_depend_on_its_steps(solve, steps):
     assert several.history["level"].max() == pytest.approx(highest, rel=1e-4)
 
 
+@pytest.mark.heavy
 def test_a_path_whose_water_withdraws_again_at_the_same_place_ends():
     """Once continued at a level above the highest one, the same increments would follow again."""
     section = {"dam_height": 5.81, "dam_base": 4.40398, "dam_crest": 0.848, "n_joint": 40}
@@ -185,6 +186,7 @@ def test_a_step_that_breaks_a_joint_at_once_is_tried_by_shorter_ones(solve):
     assert one["crest_ux"] == pytest.approx(four["crest_ux"], rel=1e-5)
 
 
+@pytest.mark.heavy
 def test_strength_that_a_step_has_destroyed_is_no_proof_of_sliding(solve):
     """Without shorter steps the base breaks at once, and holds no more than its shear."""
     (result,) = solve("dam", "44.4,190.5", "0", 4, **STIFF_BASE, smallest_step=1)
@@ -281,6 +283,7 @@ def test_a_step_to_the_other_equilibrium_of_its_level_is_taken_again():
     assert rows_follow_one_another(stepper)
 
 
+@pytest.mark.heavy
 def test_a_path_ends_where_all_strength_is_lost():
     """Nothing holds a dam whose mixed joint has broken whole: the level falls to the base."""
     case = load("dam", {"law": "mixed", "n_joint": 10})

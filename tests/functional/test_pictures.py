@@ -65,6 +65,7 @@ def figures(runs):
     return cache(lambda name: runs(name).plot())
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("name", [as_heavy(n) if n == "overturning" else n for n in CASES])
 def test_a_picture_fits_a_page_and_nothing_is_clipped(figures, name):
     figure = figures(name)
@@ -74,6 +75,7 @@ def test_a_picture_fits_a_page_and_nothing_is_clipped(figures, name):
     assert_nothing_is_clipped(figure)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("name", [as_heavy(n) if n == "overturning" else n for n in CASES])
 def test_nothing_is_clipped_in_half_a_page(runs, name):
     """As in a report."""
@@ -94,6 +96,7 @@ def assert_nothing_is_clipped(figure):
         assert box.x1 <= figure.bbox.x1 + 1 and box.y1 <= figure.bbox.y1 + 1, part
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("name", CASES)
 def test_lines_of_a_panel_differ_without_colors(figures, name):
     """In style of the line or marker."""
@@ -200,6 +203,7 @@ def test_a_view_shows_what_is_nearest_last():
     assert np.linalg.det(pictures.VIEW) == pytest.approx(1)
 
 
+@pytest.mark.heavy
 def test_a_process_draws_the_same_picture(painted, runs, tmp_path):
     solution = runs("flow").solution
     for name in ("here", "there", "too"):
@@ -226,6 +230,7 @@ def test_an_error_of_the_drawing_process_is_raised(runs, tmp_path):
             drawing.wait()
 
 
+@pytest.mark.heavy
 def test_the_drawing_process_ends_with_its_parent():
     script = """
 import time
@@ -251,6 +256,7 @@ def is_alive(group):
     return any(int(number) == group and not state.startswith("Z") for number, state in rows)
 
 
+@pytest.mark.heavy
 def test_a_run_loads_neither_meshio_nor_the_plotting_library(tmp_path):
     """It writes its fields itself; the second process draws."""
     words = ["run", "c", "--set", "n_joint=10", "--out", str(tmp_path / "out")]
@@ -261,6 +267,7 @@ def test_a_run_loads_neither_meshio_nor_the_plotting_library(tmp_path):
     assert (tmp_path / "out" / "c.png").exists() and (tmp_path / "out/fields/dam_t1.vtu").exists()
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("name", further(1, ["flow", "k"]))
 def test_two_processes_draw_the_same_picture(painted, runs, tmp_path, name):
     solution = runs(name).solution
@@ -497,6 +504,7 @@ def test_the_crest_of_a_geometry_of_ones_own_is_in_the_picture_of_its_critical_l
     assert [line.get_label() for line in axes.get_lines()] == ["crest 45 m"]
 
 
+@pytest.mark.heavy
 def test_bases_speak_for_the_dam_and_all_curves_have_a_name():
     """A contraction joint slips whole while the dam stands; without water it has no curve of it."""
     run = dj.run(dj.case("monoliths", **COARSE, levels=[45.0]))

@@ -86,6 +86,7 @@ def test_both_engines_agree_on_a_factor(tmp_path, of, case, settings):
     assert_allclose(*factors, rtol=1e-6)
 
 
+@pytest.mark.heavy
 def test_dissipation_control_prescribes_the_energy_of_the_joints():
     """SSNP133, once the right ligament has broken: the areas below the curves of all points, less
     the triangles of unloading to the origin; before, the point has moved back.

@@ -30,6 +30,7 @@ def test_length_by_rice():
     assert process_zone.shear(case) is process_zone.shear(load("dam", {"adhesion": 0.0})) is None
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("n_joint, expected", [(20.0, True), (180.0, False)])
 def test_the_hint_stands_where_an_opened_zone_has_less_than_three_elements(
     solve, n_joint, expected

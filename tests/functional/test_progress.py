@@ -105,6 +105,8 @@ def test_commands_print_lines(command, frequent, words, pattern):
     assert code == 0 and re.search(pattern, err, re.MULTILINE), err
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "words",
     [
@@ -122,6 +124,7 @@ def test_before_the_first_step_the_lines_say_what_takes_the_time(command, freque
     assert any(not line.startswith("dam, mesh") for line in rest)
 
 
+@pytest.mark.heavy
 def test_the_memory_of_all_joints_is_estimated():
     """119 lifts on the mesh of a joint, as the unknowns of each are condensed."""
     lifts = tuple(45 * k / 120 for k in range(1, 120))
@@ -155,6 +158,7 @@ def test_the_forecast_grows_with_bodies_joints_and_steps():
     assert seconds(load("dam", lifts, steps=50)) > 1.1 * seconds(of_lifts)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "settings",
     [

@@ -191,6 +191,7 @@ CONSISTENT = {
 }
 
 
+@pytest.mark.heavy
 @few
 @given(joints, levels, st.sampled_from(["level", "crest"]), st.sampled_from(list(SYSTEMS)))
 def test_results_in_other_consistent_units(solve, joint, level, drive, system):
@@ -200,6 +201,7 @@ def test_results_in_other_consistent_units(solve, joint, level, drive, system):
     same(solve(case), solve(other), scaled, within=1e-10)
 
 
+@pytest.mark.heavy
 def test_gmsh_meshes_a_section_in_mm_as_in_m():
     """Automatic and given sizes; in 3D. The last digit of a length would move nodes."""
     lengths = {"dam_height": 63.07, "dam_base": 47.3, "dam_crest": 6.31, "batter": 2.9}
@@ -218,6 +220,7 @@ def test_gmsh_meshes_a_section_in_mm_as_in_m():
         assert (1e3 * points[0] == points[1]).all()
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "scene", further(4, [n for n, (_, engine) in CONSISTENT.items() if engine == "auto"])
 )
@@ -352,6 +355,7 @@ def test_reliability_and_calibration_in_mm_are_those_in_m(tmp_path):
 # --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.heavy
 @few
 @given(
     joints,
@@ -365,6 +369,7 @@ def test_results_do_not_depend_on_the_numbering_of_the_mesh(
     same(solve(own(mesh, joint, level)), solve(own(mesh, joint, level, numbering=numbering)))
 
 
+@pytest.mark.heavy
 @few
 @given(joints, levels, st.floats(-1e3, 1e3), st.floats(0, 1e3))
 def test_results_do_not_depend_on_the_position(solve, own, mesh, joint, level, along, up):
@@ -381,6 +386,7 @@ def test_a_mesh_with_the_reservoir_at_large_x_is_refused(solve, own, mesh):
         solve(own(mesh.moved((0, 0, 0), "x"), {}, 40.0))
 
 
+@pytest.mark.heavy
 @settings(few, max_examples=3)
 @given(joints)
 def test_results_of_a_mirrored_valley(solve, own, joint):
@@ -399,6 +405,7 @@ def test_results_of_a_mirrored_valley(solve, own, joint):
 # --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.heavy
 @few
 @given(joints, st.floats(35, 44), st.floats(0.01, 0.99))
 def test_filling_in_two_steps_instead_of_one(solve, joint, level, share):
@@ -410,6 +417,7 @@ def test_filling_in_two_steps_instead_of_one(solve, joint, level, share):
     assert max(off.values()) < 1e-6, off
 
 
+@pytest.mark.heavy
 @few
 @given(joints, levels, st.floats(0, 28), st.floats(0.01, 0.99))
 def test_emptying_in_two_steps_instead_of_one(solve, joint, level, low, share):

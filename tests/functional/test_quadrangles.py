@@ -61,6 +61,7 @@ def blocks(tmp_path, monkeypatch):
     return str(path)
 
 
+@pytest.mark.heavy
 def test_quadrangles_are_as_accurate_as_triangles(blocks, solve):
     """Opening of the heel, displacement of the crest, stress at the toe: closer to those of a fine
     mesh than with triangles of as many unknowns.
@@ -77,6 +78,7 @@ def test_quadrangles_are_as_accurate_as_triangles(blocks, solve):
     assert np.all(np.abs(quads - fine) < 0.7 * np.abs(halves - fine))
 
 
+@pytest.mark.heavy
 def test_both_engines_agree_on_quadrangles_beside_triangles(blocks):
     """Rows of the joint; displacement and stress of both bodies, element by element. The waterline
     cuts no element.
@@ -93,6 +95,7 @@ def test_both_engines_agree_on_quadrangles_beside_triangles(blocks):
                 assert_allclose(getattr(b, field)[body], values, rtol=0, atol=1e-6 * size)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("pattern, flat", [("layers", "free"), ("regular", "regular")])
 def test_3d_contains_the_plane_solution(solve, pattern, flat):
     """A layer of prisms or hexahedra as thick as the joint is long, fixed along z."""

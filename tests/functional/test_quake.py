@@ -80,6 +80,7 @@ def test_a_block_under_a_rectangle_of_acceleration(tmp_path, dt, error, sign):
     assert mean_slip(quake) == pytest.approx(-sign * rectangle_slip(8, 0.5, 0.2), rel=error)
 
 
+@pytest.mark.heavy
 def test_a_block_under_a_half_sine(tmp_path):
     times = np.arange(0, 0.3025, 0.0025)
     values = np.maximum(8 * np.sin(np.pi * times / 0.3), 0)
@@ -210,6 +211,7 @@ def test_energy_is_only_lost_after_the_shaking(tmp_path):
     assert changes.max() < 1e-9 * np.ptp(energies)
 
 
+@pytest.mark.heavy
 def test_the_added_mass_is_westergaards(tmp_path):
     """7/12 rho H^2 in front of a vertical face, in the mass and in the load along x only."""
     record = smooth_record(tmp_path / "r.csv", 1.0)
@@ -232,6 +234,8 @@ def test_the_added_mass_is_westergaards(tmp_path):
 ELASTIC = DAM | {"adhesion": 1e12}
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize("alpha", [-0.05, pytest.param(0.0, marks=pytest.mark.heavy)])
 def test_the_error_falls_with_the_square_of_the_step(tmp_path, alpha):
     record = smooth_record(tmp_path / "r.csv", 2.0, duration=0.64)
@@ -259,6 +263,7 @@ def test_frequencies_against_a_dense_eigenvalue_solution(tmp_path):
     assert quake.frequencies == pytest.approx(expected, rel=1e-7)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("braked", further(1, [2.0, 1.0]))
 def test_free_vibration_decays_as_rayleigh_damping_says(tmp_path, braked):
     """In the first mode, at the damping's first frequency: amplitude exp(-xi omega t); braked by
@@ -302,6 +307,7 @@ def test_free_vibration_decays_as_rayleigh_damping_says(tmp_path, braked):
     assert peaks[1] / peaks[0] == pytest.approx(expected, rel=2e-3)
 
 
+@pytest.mark.heavy
 def test_modes_are_named_by_the_mass_that_moves_along_each_axis(tmp_path):
     """The first mode of a dam sways; all of a block on a soft joint move it along an axis each."""
     record = smooth_record(tmp_path / "r.csv", 1.0)
@@ -339,6 +345,8 @@ def test_joint_dashpots_of_a_closed_joint(tmp_path):
     assert opening == pytest.approx(exact, abs=1e-3 * np.abs(exact).max())
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "mode, uplift",
     [("zero", "imposed"), pytest.param("unchanged", "cracked", marks=pytest.mark.heavy)],
@@ -367,6 +375,7 @@ def test_water_in_the_joint_during_an_earthquake(tmp_path, mode, uplift):
         assert uplifts("crack")[0][:, 0].max() > 1.05 * static["U"]
 
 
+@pytest.mark.heavy
 def test_water_returns_to_a_crack_that_closes(tmp_path):
     """zero: the static uplift in each step that begins with a closed joint, broken or not; of
     law = rupture a broken point belongs to the crack for good.
@@ -388,6 +397,7 @@ def test_water_returns_to_a_crack_that_closes(tmp_path):
 # -- condensation, three dimensions, several joints
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("alpha", [-0.05, 0.0])
 def test_steps_solve_the_equations_of_all_unknowns(tmp_path, alpha):
     """Residual of the uncondensed equations at every step, while the dam slides and rocks."""
@@ -421,6 +431,7 @@ def test_steps_solve_the_equations_of_all_unknowns(tmp_path, alpha):
     assert largest < 1e-8
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("other", ["Woodbury", pytest.param("SuperLU", marks=pytest.mark.heavy)])
 def test_linear_solvers_agree(tmp_path, monkeypatch, other):
     """Dense matrices of few unknowns against the formula for many; MUMPS against SuperLU."""
@@ -439,6 +450,8 @@ def test_linear_solvers_agree(tmp_path, monkeypatch, other):
     assert slips[1] == pytest.approx(slips[0], rel=1e-6)
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "pattern, order", [("layers", 1.0), pytest.param("split", 2.0, marks=pytest.mark.heavy)]
 )
@@ -463,6 +476,7 @@ def test_a_section_of_any_thickness_moves_as_in_plane_strain(tmp_path, pattern, 
     assert masses[1] == pytest.approx(masses[0], rel=1e-9)
 
 
+@pytest.mark.heavy
 def test_momentum_above_each_of_several_joints(tmp_path):
     """T of each joint: the static one less the inertia of all that is above it; Newmark."""
     record = smooth_record(tmp_path / "r.csv", 6.0, duration=0.5)
@@ -623,6 +637,7 @@ def test_the_table_of_several_records_fits_the_terminal():
     assert row["folder"] in lines[-3] and row["verdict"] in lines[-3]
 
 
+@pytest.mark.heavy
 def test_earthquakes_that_are_finished_are_not_computed_again(
     command, case_file, tmp_path, records, monkeypatch
 ):
@@ -650,6 +665,8 @@ def test_two_records_of_one_name_are_refused(refused, case_file, tmp_path):
     assert "must be given once, and have its own name" in message
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize("engine", ["condensed", pytest.param("getdp", marks=pytest.mark.heavy)])
 def test_from_python_an_earthquake_is_what_the_command_writes(command, case_file, tmp_path, engine):
     """Rows, static states, frames, stress and summary, of either engine; nothing is written."""
@@ -721,6 +738,7 @@ def test_the_command_writes_rows_summary_and_picture(command, case_file, tmp_pat
     assert "its stiffness part alone acts" in page and "The rigid block [Newmark 1965]" in page
 
 
+@pytest.mark.heavy
 def test_run_json_has_what_that_of_a_run_has(command, case_file, tmp_path):
     """But for the estimate of the discretisation error and what only load steps have."""
     short = "--set", "dt=0.01", "--no-picture", "--set", "record_rest=0.3"
@@ -805,6 +823,7 @@ def test_a_broken_joint_without_friction_is_said_first(law, broken, verdict, beg
     assert words.endswith("; the dam stands after the earthquake") == (verdict == "stands")
 
 
+@pytest.mark.heavy
 @pytest.mark.usefixtures("no_pictures")
 def test_a_dam_that_flies_away_does_not_stand(command, case_file):
     """Broken by a law without friction; exit code 1, and the sentence is first."""
@@ -816,6 +835,7 @@ def test_a_dam_that_flies_away_does_not_stand(command, case_file):
     assert info["verdict"] in ("broken without friction", "no equilibrium")
 
 
+@pytest.mark.heavy
 @pytest.mark.usefixtures("no_pictures")
 def test_notes_come_before_the_numbers(command, case_file):
     """Steps that do not resolve the first period; an offset of the record."""
@@ -829,6 +849,7 @@ def test_notes_come_before_the_numbers(command, case_file):
     assert "note: " not in command("quake", case_file, *better, "--no-picture")[1]
 
 
+@pytest.mark.heavy
 def test_a_joint_that_stays_closed_has_no_peak_of_its_opening(command, case_file, tmp_path):
     """Neither a value nor a picture of it; its water does not follow a crack."""
     weak = "--set", "record_scale=0.05", "--set", "required_SSF=1.2"
@@ -1253,6 +1274,7 @@ def test_bad_input_is_one_line_and_writes_nothing(refused, case_file, options, m
     assert message in refused("quake", case_file, *options)
 
 
+@pytest.mark.heavy
 def test_a_dam_without_static_equilibrium_is_a_failed_run(command, case_file):
     code, _, err = command("quake", case_file, "--set", "mu=0.2")
     assert code == 1 and "static loads have no equilibrium" in err

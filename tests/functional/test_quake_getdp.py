@@ -214,6 +214,7 @@ def test_what_a_run_leaves_out_is_said_before_it(case_file, tmp_path):
     assert again.endswith("--engine getdp starts an interrupted earthquake again")
 
 
+@pytest.mark.heavy
 def test_a_dam_without_static_equilibrium_is_a_failed_run(command, case_file):
     code, _, err = command("quake", case_file, "--engine", "getdp", "--set", "mu=0.1")
     assert code == 1 and "static loads have no equilibrium" in err

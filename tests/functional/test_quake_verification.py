@@ -49,6 +49,7 @@ def files(tmp_path_factory):
     return verified_quake(DAM | settings, "35", record, folder / "out")
 
 
+@pytest.mark.heavy
 def test_the_files_of_an_earthquake_violate_no_rule(files):
     assert files.violations() == []
     rows = files.shaken.rows
@@ -114,6 +115,7 @@ def test_an_altered_column_of_a_joint_is_detected(
     assert not any(line.startswith(f"joint {2 - number}: ") for line in found)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "column, change, message",
     further(
@@ -147,6 +149,8 @@ RUPTURE = {"law": "rupture", "sigma_max": 2e5}
 LIFT = {"lift_heights": (20.0,), "uplift": ("flow", "cracked")}
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "settings",
     [
@@ -225,6 +229,7 @@ def test_random_earthquakes_have_no_defect_and_leave_static_scenes_as_they_are(
     assert f"(seed {seed})" in page and trust.QUAKES_VERIFIED in page
 
 
+@pytest.mark.heavy
 def test_random_earthquakes_can_be_loaded_and_have_all_laws_and_waters(tmp_path):
     scenes = [random_quake(7, number, tmp_path) for number in range(60)]
     cases = [scene.case for scene in scenes]
@@ -243,6 +248,7 @@ def test_random_earthquakes_can_be_loaded_and_have_all_laws_and_waters(tmp_path)
 # -- the equations of all unknowns
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "settings",
     further(
@@ -273,6 +279,7 @@ def test_the_equations_of_all_unknowns_and_the_balance_of_energy(tmp_path, setti
 # -- further runs, and closed forms
 
 
+@pytest.mark.heavy
 def test_the_slip_of_a_rigid_block_is_compared_with_its_closed_form(tmp_path):
     """Under a half sine (Newmark 1965), 0.054306889 m; another friction is noticed."""
     times = np.arange(0, 0.3025, 0.0025)
@@ -331,6 +338,7 @@ def test_a_joint_that_slides_is_not_taken_for_an_elastic_one(tmp_path):
     assert found["class"] == stress.DEFECT and "asymmetry" in found["findings"]
 
 
+@pytest.mark.heavy
 def test_engines_that_differ_are_compared_again_with_shorter_steps(files, tmp_path):
     """Softening: a step of 5 ms may have several equilibria."""
     altered(files, tmp_path, "quake", "N", lambda v: 1.01 * v)

@@ -75,6 +75,7 @@ def test_momentum_and_mass_are_balanced_at_every_step(record, lowest, turbulent)
     assert largest < 1e-8
 
 
+@pytest.mark.heavy
 def test_thin_water_is_the_steady_flow_of_the_moment(record):
     """A viscosity of a millionth: the pressure of each step is that of steady flow at its end."""
     settings = WET | {"visc": 1e-9, "storage": 1e-14, "aperture_min": 1e-3}
@@ -90,6 +91,7 @@ def test_thin_water_is_the_steady_flow_of_the_moment(record):
     assert seen > 0.1 * static.max()
 
 
+@pytest.mark.heavy
 def test_drains_of_part_effect_keep_the_pressure_of_a_closed_joint(record):
     """It does not open: water that is stored is at rest in every step, as before the earthquake."""
     drains = {"drains": 1.0, "drain_x": 5.0, "drain_effectiveness": 0.6, "n_joint": 6.0}
@@ -100,6 +102,7 @@ def test_drains_of_part_effect_keep_the_pressure_of_a_closed_joint(record):
         assert pressure.nodes == pytest.approx(before.nodes, abs=1e-9 * before.nodes.max())
 
 
+@pytest.mark.heavy
 def test_an_interrupted_earthquake_continues_with_its_water(record, tmp_path):
     settings = WET | {"n_joint": 6.0}
     quake = earthquake(record, settings, "30")
@@ -138,6 +141,7 @@ def test_refused(command, record, words, message):
     assert (code, out) == (2, "") and len(error.splitlines()) == 1 and message in error, error
 
 
+@pytest.mark.heavy
 def test_a_dam_that_floats_after_an_earthquake_finds_its_static_state():
     """Its joint is open by 5 mm throughout: from there, Newton's method has no contact."""
     coarse = {"n_joint": 10.0, "h_dam": 6.0, "h_found": 12.0}

@@ -76,6 +76,7 @@ def test_form_and_sorm_of_a_dam_that_slides(trial):
     assert of.d_mu > 0 and levels.d_mu.isna().any()
 
 
+@pytest.mark.heavy
 def test_form_and_sorm_without_derivatives(monkeypatch):
     """Where critical levels have none, as at kinks: by differences of levels, here by the closed
     form, with the same probabilities as with derivatives.
@@ -94,6 +95,7 @@ def test_form_and_sorm_without_derivatives(monkeypatch):
     assert row.breitung == pytest.approx(4.459e-3, rel=0.02)
 
 
+@pytest.mark.heavy
 def test_form_and_sorm_need_few_critical_levels():
     case = dj.case("dam", levels=[30, 36], **SLIDES)
     result = dj.reliability(case, **VARIED, samples=0, jobs=1)
@@ -221,6 +223,7 @@ def test_samples_around_the_design_point_are_unbiased():
     assert sum(low < 4.459e-3 < high for _, low, high in studies) >= 180
 
 
+@pytest.mark.heavy
 def test_derivatives_are_those_of_the_closed_form():
     """Also through a tied parameter, and with correlated variables in one joint's limit state."""
     case = dj.case("dam", levels=[30, 36], **SLIDES)
@@ -284,6 +287,7 @@ def test_files_and_continuation(painted, command, tmp_path):
     assert float(first["critical_level"]) == pytest.approx(expected, rel=1e-4)
 
 
+@pytest.mark.heavy
 def test_other_variables_replace_the_file(command, tmp_path):
     words = "reliability", "dam", *SETTINGS, "--samples", "0", "--jobs", "1", "--out", "out"
     assert command(*words, "--vary", f"mu={MU}", "--vary", "level=normal(38,1)")[0] == 0

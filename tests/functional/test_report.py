@@ -61,6 +61,7 @@ def folder(ran, tmp_path):
     return shutil.copytree(ran, tmp_path / "out" / "my")
 
 
+@pytest.mark.heavy
 def test_plot_redraws_the_pictures_of_a_run(painted, command, folder):
     path = folder / "my.png"
     drawn = np.asarray(Image.open(path)).astype(float)
@@ -73,6 +74,7 @@ def test_plot_redraws_the_pictures_of_a_run(painted, command, folder):
     assert np.mean(np.abs(again - drawn) > 8) < 1e-3
 
 
+@pytest.mark.heavy
 def test_plot_of_a_run_with_displacement_control(command, texts_drawn):
     """Also its load curve; without fields there is no section."""
     assert command("run", "k", *SMALL, "--no-fields", "--no-picture")[0] == 0
@@ -182,6 +184,7 @@ def test_report_has_results_and_parameters(command, folder, tmp_path):
     assert f"machine {record['machine']}" in words and "cores" in record["machine"]
 
 
+@pytest.mark.heavy
 def test_all_input_of_a_run_is_in_its_report(page, ran):
     """Every parameter that matters in the scene, with its value."""
     case = stored.read(ran).result.case
@@ -279,6 +282,7 @@ def test_the_eccentricity_has_its_direction(level, end):
     assert (rigid.eccentricity > 0) == (end == "toe")
 
 
+@pytest.mark.heavy
 def test_report_of_load_combinations(checked, page_of_check):
     """The summary has the factors and verdicts of check.csv, in its order."""
     summary = rows_below(page_of_check, "Summary")
@@ -386,6 +390,7 @@ def test_report_of_several_joints_has_the_levels_of_each(command, tmp_path):
     assert page.count("SSF = (µ N") == 2
 
 
+@pytest.mark.heavy
 def test_stress_on_the_faces_is_that_of_water_and_of_a_beam(tmp_path):
     """Of a wall: along its faces weight and bending stress, normal to them the water; the mean
     pressure on the rock is that of the weight.
@@ -426,6 +431,7 @@ def test_principal_stresses_are_those_of_mohr():
     assert_allclose(found[1], [-4, 0, 4], atol=1e-12)
 
 
+@pytest.mark.heavy
 def test_the_name_of_the_dam_is_in_the_report(command, page, folder, tmp_path):
     """By default the title of the case."""
     assert '<td contenteditable="true">&lt;i&gt;my&lt;/i&gt; dam &amp; joint</td>' in page
@@ -497,6 +503,7 @@ def test_pages_of_the_report_as_pdf(painted, painted_check, command, tmp_path, m
             assert max(ends) > bottom / 2
 
 
+@pytest.mark.heavy
 def test_the_caption_of_maps_of_a_joint_has_no_colors_of_curves():
     def captions(name, **settings):
         solution = dj.run(dj.case(name, n_joint=6, h_dam=15, h_found=60, **settings)).solution
@@ -531,6 +538,7 @@ def test_a_pdf_without_weasyprint_is_refused(command, checked, tmp_path, monkeyp
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.heavy
 def test_report_of_a_dam_that_passes_with_its_estimated_error(command, tmp_path):
     """The required factors are met; the estimated error of --accuracy is that of run.json."""
     needs = "--set", "required_SSF=0.1", "--levels", "40", "--accuracy", "coarse", "--no-picture"
@@ -543,6 +551,7 @@ def test_report_of_a_dam_that_passes_with_its_estimated_error(command, tmp_path)
     assert "not estimated" not in page
 
 
+@pytest.mark.heavy
 def test_report_of_a_run_without_a_converged_step(command, tmp_path):
     """A dam too light to stand has no state to draw; the page states it."""
     light = "--set", "rho_dam=10", "--set", "law=friction", "--set", "smallest_step=0.5"

@@ -90,6 +90,7 @@ def test_what_else_decides_a_row_is_part_of_the_key(case, plan):
     assert len(set(keys)) == 2
 
 
+@pytest.mark.heavy
 def test_a_torn_last_line_is_computed_again_and_no_other(command, tmp_path):
     """At each length of it; also of the first line."""
     assert command(*WORDS, "--vary", "mu=0.5,0.6")[0] == 0

@@ -100,6 +100,7 @@ def test_a_wave_from_below_has_twice_its_velocity_at_the_surface_and_leaves(tmp_
 HEAVY = DAM | {"rock_mass": 1.0, "rho_found": 2600.0, "record_rest": 1.0}
 
 
+@pytest.mark.heavy
 def test_the_reactions_of_the_static_state_remain(tmp_path):
     """Nothing moves in an earthquake of almost no size, under a full reservoir."""
     record = smooth_record(tmp_path / "r.csv", 1e-9, duration=0.2)

@@ -142,6 +142,7 @@ RIGID = {
 }
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "uplift, crack, force",
     [
@@ -159,6 +160,7 @@ def test_the_crack_of_a_rigid_dam_is_that_of_the_gravity_method(solve, uplift, c
     assert result.last["N"] == pytest.approx(force, rel=2e-3)
 
 
+@pytest.mark.heavy
 def test_uplift_cracked_has_no_water_in_an_intact_bond(solve):
     """uplift = cracked: full head in the broken part; uplift = flow: in any opening."""
     (cracked,), (flow,), (linear,) = (
@@ -191,6 +193,7 @@ def test_an_impossible_section_is_refused(settings, message):
         load("dam", settings)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("effectiveness", further(1, [1.0, 0.5, 0.0]))
 def test_drains_in_the_uncracked_part(solve, effectiveness):
     """As in the gravity method, on a rigid dam; there is a node at the drains."""
@@ -215,6 +218,7 @@ def test_drains_of_a_closed_lift_joint(solve, uplift):
     assert flowing.last["U"] == pytest.approx(drained.last["U"], rel=1e-6)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("name", ["e", pytest.param("f", marks=pytest.mark.heavy)])
 def test_drains_where_water_flows(solve, name):
     """They take a part of the flow, the rest leaves at the toe; in 2D and 3D the same. Where

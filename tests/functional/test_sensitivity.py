@@ -51,6 +51,7 @@ def test_the_critical_level_of_a_dam_that_slides():
     assert abs(rates["E_dam"]) * 2.5e10 < 1e-6 and abs(rates["K_N"]) * 1e11 < 1e-6
 
 
+@pytest.mark.heavy
 def test_the_critical_level_of_the_joint_that_fails():
     """The friction of another one has no effect."""
     lifts = {**SLIDES, "n_joint": 20, "lift_heights": (12.0,), "mu": 0.8, "lift 12 m.mu": 0.5}
@@ -62,6 +63,7 @@ def test_the_critical_level_of_the_joint_that_fails():
     assert abs(rates["base.mu"]) < 1e-6
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("beyond", [-1e-7, 1e-7])
 def test_a_kink_of_the_critical_level_where_another_joint_fails(beyond):
     """Base and lift slide at the same level but for 2 um: the derivatives are those of the one that
@@ -114,6 +116,8 @@ SIZES |= {"crack_end": 1e2, "SSF": 1.0, "OSF": 1.0, "x_resultant": 1e2}
 EXACT, OF_SIZE = 1e-6, 1e-8
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "uplift",
     [
@@ -154,6 +158,7 @@ def test_the_results_of_a_run_against_central_differences(law, uplift):
             assert got == pytest.approx(expected, rel=EXACT, abs=allowed), (row.name, column)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "driven", [{"drive": "heel"}, {"drive": "crest", "drive_load": "quake", "k_h": 0.1}]
 )
@@ -237,6 +242,7 @@ def test_random_dams_against_central_differences(numbers):
     assert compared >= 5 * len(numbers)
 
 
+@pytest.mark.heavy
 def test_fifty_parameters_of_a_dam_with_lifts():
     """All forces are proportional to moduli, stiffnesses, strengths, energies and densities
     together, and displacements do not change with them [Euler's theorem].
@@ -261,6 +267,7 @@ def test_fifty_parameters_of_a_dam_with_lifts():
         assert total == pytest.approx(expected, rel=1e-6, abs=1e-6 * abs(last[column])), column
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("given", [{}, {"G_f": 90.0}, {"pena_rupture": 3.0}])
 def test_all_parameters_of_a_law_whose_energy_is_given_twice(given):
     """Of G_f and pena_rupture one follows from the other; each joint has values of its own in a
@@ -305,6 +312,7 @@ def test_a_level_that_is_reached_again_has_the_derivatives_of_the_first_time(law
     assert not any(row.kink for row in rows)
 
 
+@pytest.mark.heavy
 def test_a_kink_is_said_and_its_derivative_is_that_for_a_larger_value():
     """At the level at which the first point of a joint without tension opens, a larger density of
     the water opens it, a smaller one does not.
@@ -331,6 +339,7 @@ def test_a_kink_is_said_and_its_derivative_is_that_for_a_larger_value():
     assert row.derivatives["crest_ux"] == pytest.approx(above, abs=0.05 * abs(above - below))
 
 
+@pytest.mark.heavy
 def test_the_geometry_by_two_runs():
     """The resultants are linear in the width of the base, without a crack."""
     case = dj.case("dam", levels=[20, 30], n_joint=10)
@@ -350,6 +359,7 @@ def test_the_geometry_by_two_runs():
     assert abs(of_mu.derivatives["OSF"]) < 1e-9
 
 
+@pytest.mark.heavy
 def test_a_run_beyond_the_limit_has_the_derivatives_of_its_last_equilibrium():
     """Its time is not that of a step."""
     case = dj.case("dam", levels=[30, 80], steps=1, law="friction", n_joint=6, order=1)
@@ -357,6 +367,7 @@ def test_a_run_beyond_the_limit_has_the_derivatives_of_its_last_equilibrium():
     assert [row.level for row in rows] == [30, pytest.approx(history(case)["level"])]
 
 
+@pytest.mark.heavy
 def test_a_derivative_that_is_not_found_is_said(command, tmp_path):
     """The limits of dams of other widths are at other levels."""
     words = "run", "dam", "--set", "n_joint=6", "--set", "order=1", "--set", "law=friction"
@@ -372,6 +383,7 @@ def test_a_derivative_that_is_not_found_is_said(command, tmp_path):
     assert any(line.startswith("rho_dam") for line in out.splitlines())
 
 
+@pytest.mark.heavy
 def test_the_factors_of_a_check(command, tmp_path):
     words = "check", "dam", "--set", "n_joint=10", "--levels", "30", "--out", "out"
     code, out, _ = command(*words, "--sensitivity", "mu,dam_base")
@@ -401,6 +413,7 @@ def test_the_printed_table_fits_the_terminal():
         assert printed.endswith("at a kink: lift 12 m.adhesion, lift 25 m.adhesion")
 
 
+@pytest.mark.heavy
 def test_only_the_last_step_is_printed_where_its_level_stands_twice(command, texts_drawn):
     """As of an earthquake after the last level; results that do not change have no panel."""
     words = "run", "dam", "--set", "n_joint=10", "--levels", "20,30,30", "--set", "k_h=0.05"
@@ -436,6 +449,7 @@ def test_the_table_of_a_run(command, tmp_path):
     assert not (tmp_path / "one/sensitivity.csv").exists()
 
 
+@pytest.mark.heavy
 def test_the_table_of_a_critical_level(command, tmp_path, texts_drawn):
     settings = [w for n, v in SLIDES.items() for w in ("--set", f"{n}={v}")]
     words = "critical", "dam", *settings, "--set", "mu=0.6", "--levels", "30,36", "--out", "out"
@@ -454,6 +468,7 @@ def test_the_table_of_a_critical_level(command, tmp_path, texts_drawn):
     assert out.index("rho_dam") < out.index("mu  ")
 
 
+@pytest.mark.heavy
 def test_changes_of_a_critical_level_by_one_standard_deviation(command, tmp_path, texts_drawn):
     """Of the density more than of friction here, other than by one percent each."""
     settings = [w for n, v in SLIDES.items() for w in ("--set", f"{n}={v}")]
@@ -499,6 +514,7 @@ def test_bad_input_is_one_line_and_writes_nothing(command, tmp_path, words, mess
     assert message in error and len(error.splitlines()) == 1
 
 
+@pytest.mark.heavy
 def test_a_level_of_unstable_growth_has_no_derivative():
     """Where a point is about to break the level of the path still rises: the derivative at the
     displacement there is not that of the highest level (-0.3 m for 7 m with 8 elements).

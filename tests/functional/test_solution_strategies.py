@@ -25,6 +25,7 @@ def test_a_joint_without_tensile_strength_opens_in_one_step(solve, uplift, n_joi
     assert 3e-6 < result.history["max_opening"][-1] < 6e-6
 
 
+@pytest.mark.heavy
 def test_short_shear_release_on_a_soft_dam(solve):
     """SSNP142's brittle joint (L_CT = 1e-10 m) opened by 4e-4 m; by another solver 4.142e-4 m."""
     (result,) = solve("ssnp142", "40", dam_height=40, dam_base=30, E=1e10, h_found=7)

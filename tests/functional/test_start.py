@@ -30,6 +30,7 @@ def loaded(cache, *words):
     return done.stdout.splitlines()[-1].split()[1:]
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("case", further(1, ["c", "g"]))
 def test_a_run_loads_gmsh_without_a_cache_and_numpy_alone_with_it(tmp_path, case):
     words = "run", case, "--no-fields", "--no-picture", "--out", str(tmp_path / "out")

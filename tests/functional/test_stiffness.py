@@ -17,6 +17,7 @@ def test_the_closure_under_the_weight_is_that_of_a_rigid_block():
     assert text.endswith("K_N L/E = 136, K_N h/E = 13.6, K_T/K_N = 0.5")
 
 
+@pytest.mark.heavy
 def test_repeated_runs_are_those_of_a_tenth_and_ten_times_the_stiffness(solve):
     case = load("dam", SMALL, "45")
     runs = list(stiffness.repetitions(case, solve("dam", "45", **SMALL)[0], ["K_T"], "auto"))
@@ -30,6 +31,7 @@ def test_repeated_runs_are_those_of_a_tenth_and_ten_times_the_stiffness(solve):
     assert len({f"{stiffness.last_state(r)['SSF']:.3f}" for _, r in runs}) == 1  # of the loads
 
 
+@pytest.mark.heavy
 def test_the_command_prints_a_row_for_each_joint_and_what_is_refused(command):
     """With a tenth of K_T the joint of friction stores more than G_t before it softens."""
     lifts = "--set", "lift_heights=20", "--set", "K_T=1e9", "--set", "G_t=100"
@@ -43,6 +45,7 @@ def test_the_command_prints_a_row_for_each_joint_and_what_is_refused(command):
     assert "K_T / 10: G_t = 100: must be > 200 N/m" in out
 
 
+@pytest.mark.heavy
 def test_a_parameter_without_effect_is_named(command):
     """With law rupture no friction acts; N does not depend on K_N, which leaves round-off in it."""
     words = "run", "a", *WORDS[:6], "--no-picture", "--no-fields"

@@ -237,6 +237,7 @@ def test_scenes_have_all_that_is_drawn_and_can_be_loaded():
             assert all(scene.settings.get(n) == single.settings.get(n) for n in kept)
 
 
+@pytest.mark.heavy
 def test_flow_in_time_is_selected_and_counted(tmp_path):
     """`--with`: the first scenes of a seed that have it; a row of the page, another with drains."""
     for words, records, features in (

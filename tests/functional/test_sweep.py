@@ -28,6 +28,7 @@ def rows(path):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.heavy
 @pytest.mark.usefixtures("no_pictures")
 def test_rows_are_equal_to_single_runs(solve, command, tmp_path):
     words = "sweep", "c", "--vary", "mu=0.35,0.4", "--vary", "level=8,9", "--jobs", "1"
@@ -163,6 +164,7 @@ SLIDES = (
 )
 
 
+@pytest.mark.heavy
 def test_the_probability_of_failure_is_that_of_the_distribution(command, tmp_path, texts_drawn):
     """Of a Latin hypercube of the friction coefficient the share below 0.6, to one row."""
     sample = "--sample", "40", "mu=normal(0.68,0.06)"
@@ -206,6 +208,7 @@ def test_rows_skipped_by_statics_fail_in_a_full_run_too(command, tmp_path):
 MESH = "mesh_pattern=free", "quadrature=full", "n_layers=1", "h_dam=-1", "h_found=-1"
 
 
+@pytest.mark.heavy
 @pytest.mark.usefixtures("no_pictures")
 def test_ties_loading_and_accuracy(command, solve, tmp_path):
     """A row with a tied parameter and given levels equals the single run; one mesh for all rows,
@@ -240,6 +243,7 @@ def test_a_critical_level_is_a_column(command, tmp_path):
     assert command(*words)[0] == 2
 
 
+@pytest.mark.heavy
 def test_the_search_of_a_row_is_that_of_its_case():
     """The parser resolves the case of all rows once; values differ in independent parameters."""
     base = load("dam", {"law": "bond", "lift_heights": (12.0,), "adhesion": (2e5, 3e5)}, steps=3)
@@ -281,6 +285,7 @@ OF_LEVEL = "--vary", "level=8,9"
 SAMPLE = "--sample", "3", "mu=uniform(0.3,0.2)"
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "words, drawn",
     [
@@ -355,6 +360,7 @@ def test_axes_of_a_chart_suit_what_was_varied(command, tmp_path, monkeypatch):
     assert title == "own dam: 3 rows, law bond, uplift imposed, level 20 m"
 
 
+@pytest.mark.heavy
 def test_a_chart_says_that_the_slip_is_not_known(command, tmp_path, monkeypatch):
     """Of a dam that is not at rest in the end; it is not zero, and the dam does not fail."""
     smooth_record(tmp_path / "record.csv", 0.1, duration=0.05)

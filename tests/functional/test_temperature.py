@@ -26,6 +26,8 @@ DAM = {"n_joint": 20, "h_dam": 8, "h_found": 30}
 WARM = {"temperature_dam": -8.0, "temperature_linear": 15.0, "temperature_found": 3.0}
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "engine, solid",
     [
@@ -91,6 +93,7 @@ def test_the_change_grows_over_a_unit_of_time_and_then_follows_a_cosine(period, 
     assert Loading.at(case, 3.5, 0, 0).part("quake") == 1
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("engine", ["condensed", "getdp"])
 def test_summer_and_winter_move_an_elastic_dam_by_opposite_amounts(engine):
     """The joint stays closed under the weight; in spring there is no movement."""
@@ -121,6 +124,7 @@ def test_slip_in_opposite_directions_is_no_sliding():
     assert slides.verdict == "sliding"
 
 
+@pytest.mark.heavy
 def test_an_own_geometry_has_a_uniform_temperature_only():
     water = {"levels": [10], "tail_levels": 4}
     cold, warm = (dj.run(dj.case("stepped", temperature_dam=t, **water)) for t in (-5, 5))
@@ -129,6 +133,7 @@ def test_an_own_geometry_has_a_uniform_temperature_only():
         dj.case("stepped", temperature_linear=5)
 
 
+@pytest.mark.heavy
 def test_the_view_of_the_stress_in_gmsh_is_without_the_free_strain(tmp_path):
     """The plain problem definition, with a case that has units."""
     for name in ("geo", "pro", "cases"):

@@ -33,6 +33,7 @@ def test_the_output_of_a_command_is_written_below_it(tmp_path):
     assert pages.played(block, tmp_path) == f"$ damjoint \\\n    --version\n{__version__}\n"
 
 
+@pytest.mark.heavy
 def test_a_case_file_of_the_tour_is_written_and_a_refused_command_is_an_error(tmp_path):
     block = '// my.case\ntitle = "no dam";\ndefault_dam_height = -1;\n'
     assert pages.played(block, tmp_path) == block

@@ -120,6 +120,7 @@ def test_newton_finds_the_flow_of_the_secants(model, monkeypatch):
     assert few < many
 
 
+@pytest.mark.heavy
 def test_it_resists_more():
     """Under a flood: less leaks, the Reynolds number is smaller, and nothing is noted."""
     settings = FILM | {"time_unit": 600.0, "aperture_min": 2e-3}
@@ -166,6 +167,7 @@ def test_the_tangent_in_three_dimensions(solid, seconds):
     assert slowed.max() < 0.57
 
 
+@pytest.mark.heavy
 def test_a_slice_has_the_flow_of_the_section():
     """Of a wedge, turbulent and laminar: the quadratures of triangles and lines differ, the less
     the finer both meshes are, in z, too.

@@ -17,6 +17,8 @@ from damjoint_witness.verify import Witness
 SLENDER = {"dam_height": 40, "dam_base": 28.8, "E": 1e10, "h_found": 7, "sigma_max": 100}
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "uplift", ["flow", *(pytest.param(u, marks=pytest.mark.heavy) for u in ("imposed", "cracked"))]
 )
@@ -43,6 +45,7 @@ def test_the_state_after_unstable_crack_growth_hardly_depends_on_the_steps(solve
     assert max(openings) < 1.05 * min(openings)
 
 
+@pytest.mark.heavy
 def test_a_hint_reports_unstable_crack_growth(solve):
     """The hint states that the results depend on steps and mesh, and what helps."""
     (unstable,) = solve("ssnp142", "40", uplift="flow", **SLENDER)

@@ -80,6 +80,7 @@ def test_two_blocks_have_the_uplift_of_one(flip):
         assert rows["p"] == pytest.approx(WATER * (first + (last - first) * rows["x"] / 34))
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("reference", ["linear", "reservoir"])
 def test_drains_lower_the_head_of_the_whole_path(model, reference):
     """Linear between heel, drains and toe, across the joint where the blocks meet."""
@@ -102,6 +103,7 @@ def test_drains_lower_the_head_of_the_whole_path(model, reference):
             assert own == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("uplift", ["flow", "cracked"])
 def test_closed_joints_in_series_have_the_imposed_pressure(model, uplift):
     heads, places, _ = pressures(model((uplift, uplift, "none")), 9.0, 3.0)
@@ -109,6 +111,7 @@ def test_closed_joints_in_series_have_the_imposed_pressure(model, uplift):
         assert own == pytest.approx(9 - 6 * place[:, 0] / 15, rel=1e-12)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("apertures", [(1e-4, 3e-4), (3e-4, 1e-4), (1e-3, 1e-8), (1e-8, 1e-3)])
 def test_two_apertures_in_series(model, apertures):
     """Resistances L/w^3: the same flux in both, and the head between them."""
@@ -123,6 +126,7 @@ def test_two_apertures_in_series(model, apertures):
     assert np.concatenate([own.flux for own in found[:2]]) == pytest.approx(flux, rel=1e-12)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("modes", [("flow", "imposed"), ("imposed", "flow"), ("cracked", "flow")])
 def test_imposed_beside_flow_conducts_as_if_closed(model, modes):
     """By its aperture_min, also where it is open; cracked likewise where there is no crack."""
@@ -135,6 +139,7 @@ def test_imposed_beside_flow_conducts_as_if_closed(model, modes):
         assert own == pytest.approx(np.interp(place[:, 0], [0, 10, 15], [9, middle, 3]), rel=1e-12)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("mode", ["imposed", "flow"])
 @pytest.mark.parametrize("apertures", [(1e-4, 2e-4, 3e-4), (1e-8, 1e-3, 1e-8), (1e-3, 1e-8, 1e-3)])
 def test_three_joints_at_a_node(model, mode, apertures):
@@ -252,6 +257,7 @@ def test_a_path_ends_at_a_joint_without_water(model, uplift, left, right):
     assert heads[1] == pytest.approx(right, abs=1e-12)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("mode", ["imposed", "flow"])
 def test_a_waterstop_behind_another_joint(model, mode):
     """The head before it is that where the joints meet: of the reservoir without another outlet."""
@@ -285,6 +291,7 @@ def test_derivative_of_the_pressure(model, uplift):
     assert (above - below) / 2 == pytest.approx(expected, rel=1e-4, abs=1e-6 * np.ptp(expected))
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("opening", [1e-6, 1e-3])
 def test_fluxes_balance_beside_open_joints(model, opening):
     """However much better one of them conducts, in each direction."""
@@ -345,6 +352,7 @@ def test_the_gravity_method_has_the_same_uplift(model, uplift, settings):
         assert found.moment == pytest.approx(sizes @ arm, abs=10 * kink)
 
 
+@pytest.mark.heavy
 def test_the_gravity_method_of_a_crack_on_a_path(model):
     """A crack of 5 m at the inner heel conducts freely: of 15 m of the path 10 m are left."""
     built = model(("cracked", "cracked", "none"), [9.0], [0.0])
@@ -364,6 +372,7 @@ def test_the_gravity_method_of_a_crack_on_a_path(model):
     )
 
 
+@pytest.mark.heavy
 def test_the_report_says_that_water_passes_between_joints(model):
     words = "Water passes between joints that meet"
     for uplift in ("imposed", ("none", "none", "imposed"), "none"):
@@ -371,6 +380,7 @@ def test_the_report_says_that_water_passes_between_joints(model):
         assert any(words in sentence for sentence in sentences) == (uplift != "none")
 
 
+@pytest.mark.heavy
 def test_the_gravity_method_of_several_heels(model):
     """The water reaches the contraction joint's at 10 m; none if it leaves at several toes."""
     built = model("imposed", [12.0])
@@ -390,6 +400,7 @@ def test_the_gravity_method_of_several_heels(model):
     assert gravity.of_state(own, {}, {"time": 1.0}) is None
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "uplift, tail, settings",
     further(

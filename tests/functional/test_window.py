@@ -138,6 +138,7 @@ def open_window(engines, monkeypatch):
             user.close()
 
 
+@pytest.mark.heavy
 def test_nothing_to_save_before_a_run(open_window, engines):
     """First, as it needs a process that has run nothing."""
     while engines:
@@ -166,6 +167,7 @@ def test_all_parameters_are_in_the_tree_with_their_range_and_without_buttons_of_
     assert tree.get_text(tree.LEVELS) == "3, 6, 8, 9"
 
 
+@pytest.mark.heavy
 def test_only_what_matters_shows_and_followers_say_what_they_follow(open_window):
     user = open_window("a")
     assert user.entry("sigma_max")["visible"] and not user.entry("mu")["visible"]
@@ -219,6 +221,7 @@ def numbers_shown(user):
     return {entry["label"]: entry["values"][0] for entry in entries}
 
 
+@pytest.mark.heavy
 def test_results_of_the_step_shown_are_in_the_tree_beside_the_gravity_method(open_window):
     """In units that suit their size; safety factors as those of `damjoint check`."""
     user = open_window("c", **SMALL)
@@ -246,6 +249,7 @@ def test_results_of_the_step_shown_are_in_the_tree_beside_the_gravity_method(ope
     assert 1e3 * uplift == pytest.approx(result.state(1.0)["U"], rel=5e-3)
 
 
+@pytest.mark.heavy
 def test_warnings_of_the_command_line_are_shown(open_window):
     user = open_window("g", **SMALL, mu=0.9)
     user.run()
@@ -256,6 +260,7 @@ def test_warnings_of_the_command_line_are_shown(open_window):
     assert any(line.startswith(start) for line in shown_results()[2])
 
 
+@pytest.mark.heavy
 def test_playing_shows_all_steps_with_their_numbers(open_window, monkeypatch):
     """From the first level to the last one; pressed again it stops, and a change ends it."""
     monkeypatch.setattr(window.export, "LEVEL", 0.05)
@@ -287,6 +292,7 @@ def test_lines_mark_the_step_shown_in_the_curves_of_the_level(open_window):
     np.testing.assert_allclose(heights[:, 0], heights[:, 1])
 
 
+@pytest.mark.heavy
 def test_nothing_above_the_parameters_moves_when_a_run_ends(open_window):
     """The same rows before and after it, and the case in the window's title."""
     user = open_window("a", **SMALL)
@@ -300,6 +306,7 @@ def test_nothing_above_the_parameters_moves_when_a_run_ends(open_window):
     assert above() == before and gmsh.onelab.getNames(f"{tree.NUMBERS}.*")
 
 
+@pytest.mark.heavy
 def test_the_table_shows_all_levels_and_marks_the_one_shown(open_window):
     user = open_window("c", **SMALL)
     user.run()
@@ -312,6 +319,7 @@ def test_the_table_shows_all_levels_and_marks_the_one_shown(open_window):
     assert any(name.startswith("displacement") for name in user.views)
 
 
+@pytest.mark.heavy
 def test_a_softening_joint_has_a_length_and_a_colour(open_window):
     coarse = {"n_joint": 20.0, "h_dam": 8.0, "h_found": 30.0}
     user = open_window("dam", law="bond", sigma_max=3e5, G_f=300.0, **coarse)
@@ -326,6 +334,7 @@ def test_a_softening_joint_has_a_length_and_a_colour(open_window):
     assert "softening" not in before and now.endswith(f"crack 0 m, softening {zone:.3g} m")
 
 
+@pytest.mark.heavy
 def test_fields_and_scales_can_be_chosen(open_window):
     """Vertical stress replaces displacement, on the same deformed bodies; zero is in the middle of
     its scale; the scales are those of the step shown or of all steps.
@@ -356,6 +365,7 @@ def tagged(user, start):
     return next(tag for tag, name in names if name.startswith(start))
 
 
+@pytest.mark.heavy
 def test_views_have_a_step_per_level_and_replace_the_earlier_ones(open_window):
     user = open_window("c", **SMALL)
     user.run()
@@ -390,6 +400,7 @@ def test_views_have_a_step_per_level_and_replace_the_earlier_ones(open_window):
     assert not any("run 1" in view for view in user.views)
 
 
+@pytest.mark.heavy
 def test_the_status_shows_whether_the_results_belong_to_the_parameters(open_window):
     user = open_window("c", **SMALL)
     done = user.run()
@@ -419,6 +430,7 @@ def shown_results():
     return tree.get_text(tree.VERDICT), numbers, lines
 
 
+@pytest.mark.heavy
 def test_results_of_other_parameters_are_removed_at_once(open_window):
     """Before the engine has answered: after a change of a parameter, of the case, a bad value, and
     Run pressed right after it; they return with the parameter.
@@ -457,6 +469,7 @@ def test_results_of_other_parameters_are_removed_at_once(open_window):
 C_SCENE = "law friction, uplift imposed"
 
 
+@pytest.mark.heavy
 def test_the_heading_follows_law_and_water(open_window):
     user = open_window("c", **SMALL)
     user.run()
@@ -584,6 +597,7 @@ BAD_VALUES = [
 ]
 
 
+@pytest.mark.heavy
 def test_a_bad_value_is_reported_in_one_line_and_not_run(open_window):
     """One after the other in one window; with the value of before the case runs again."""
     user = open_window("e", **SMALL)
@@ -606,6 +620,7 @@ def test_a_bad_value_is_reported_in_one_line_and_not_run(open_window):
         assert not user.session.tree.marked and ": must be" not in gmsh.onelab.get(field)
 
 
+@pytest.mark.heavy
 def test_buttons_pressed_during_a_run_act_after_it(open_window, tmp_path):
     user = open_window("c", **SMALL)
     done = user.run()
@@ -644,6 +659,7 @@ def test_stop_keeps_the_converged_steps(open_window, tmp_path):
     assert user.run().startswith("done in")
 
 
+@pytest.mark.heavy
 def test_after_reset_the_parameters_are_restored(open_window):
     """Reset in the menu of Gmsh beside Run."""
     user = open_window("a")
@@ -655,6 +671,7 @@ def test_after_reset_the_parameters_are_restored(open_window):
     assert gmsh.onelab.getString("ONELAB/Button") == ["Run", "run"]
 
 
+@pytest.mark.heavy
 def test_a_case_file_of_the_user_is_not_overwritten(open_window, tmp_path):
     """Nor the target of a link; a file saved by the window itself is overwritten."""
     user = open_window("c", **SMALL)
@@ -682,6 +699,7 @@ def test_a_case_file_of_the_user_is_not_overwritten(open_window, tmp_path):
     assert user.session.status == "out: name a folder"
 
 
+@pytest.mark.heavy
 def test_an_engine_that_was_killed_is_started_again(open_window):
     """Killed during a run, as if memory were exhausted."""
     user = open_window("e", **SMALL)
@@ -721,6 +739,7 @@ def test_other_cases_and_files_can_be_opened(open_window, tmp_path):
     assert user.run().startswith("done in")
 
 
+@pytest.mark.heavy
 def test_both_uplifts_of_a_published_case_are_run(open_window):
     user = open_window("a", **SMALL)
     user.run()
@@ -817,6 +836,7 @@ def test_accuracy_refines_the_mesh(open_window):
     assert (user.entry("n_joint")["values"], user.entry("order")["values"]) == ([50], [1])
 
 
+@pytest.mark.heavy
 def test_the_joint_in_3d_is_shown_as_a_surface(open_window):
     user = open_window("f", n_joint=8.0, h_dam=3.0, h_found=4.0)
     assert user.run().startswith("done in")
@@ -837,6 +857,7 @@ SECTION = {"batter": 1.0, "batter_height": 5.0, "neck_height": 2.0}
 LOADS = {"silt_height": 2.0, "ice_force": 1e3, "ice_level": 7.0, "anchor_force": 1e3, "k_h": 0.02}
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("joint", [{"joint_slope": 5.0}, {"joint_height": 4.0}])
 def test_water_and_loads_are_drawn_for_any_section(open_window, joint):
     """Before the run the water's area is that of the outline; after it nearly, as faces move."""
@@ -1009,6 +1030,7 @@ cat status.txt
 """
 
 
+@pytest.mark.heavy
 def test_a_flood_shows_its_time_and_the_pressure_of_each_step(open_window):
     """Case flood: seconds of a unit of t and storage with their units; the curve of the pressure
     moves with the level, and the caption has the hours that have passed.

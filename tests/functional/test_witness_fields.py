@@ -145,6 +145,7 @@ ALL_LOADS = (
 ) + " ".join(f"--set {name}={was:g}" for name, (was, _) in (OF_LOADS | OF_BODIES).items())
 
 
+@pytest.mark.heavy
 def test_times_places_and_densities_of_loads_are_told_apart(tmp_path):
     words = ALL_LOADS.split()
     cli.main([*words, *SMALL.split(), "--out", str(tmp_path)])
@@ -267,6 +268,8 @@ def test_other_values_of_the_water_are_noticed(written, change):
     assert found(water, folder, (*words, "--set", change))
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "uplift, level, tail",
     [

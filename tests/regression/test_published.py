@@ -65,6 +65,7 @@ def test_validate_prints_the_table(command, tmp_path):
     assert (tmp_path / "out" / "c" / "joint.csv").exists()
 
 
+@pytest.mark.heavy
 def test_validate_exits_with_1_if_a_row_fails(command, monkeypatch):
     """With the references of the first case changed by 10 %."""
     from dataclasses import replace
@@ -100,6 +101,7 @@ def test_published_tests_beside_ssnp142(family, tmp_path):
     assert {c.verdict for c in comparisons} == {"pass"}, "\n" + validation.report(comparisons)
 
 
+@pytest.mark.heavy
 def test_validate_takes_families_and_cases(command):
     code, out, _ = command("validate", "ssnp162", "ssnv503")
     assert code == 0
@@ -107,6 +109,7 @@ def test_validate_takes_families_and_cases(command):
     assert out.splitlines()[-1].startswith("ssnv503: 7 passed, 0 failed")
 
 
+@pytest.mark.heavy
 def test_the_cracks_of_a_dam_that_is_not_judged():
     """ICOLD 1999: levels by the height and by the thrust; without tensile strength it cracks."""
     assert icold.levels(1) == pytest.approx([56, 64, 75.968, 80.28])

@@ -97,6 +97,8 @@ def with_eight_functions(bodies):
     return replace(bodies, by_name={n: changed(b) for n, b in bodies.by_name.items()})
 
 
+@pytest.mark.heavy
+@pytest.mark.heavy
 @pytest.mark.parametrize("name", ["B", "C", pytest.param("D", marks=pytest.mark.heavy)])
 def test_by_the_published_conventions(name):
     """All digits, with those conventions, too, that are not options of a case; by the options
@@ -149,6 +151,7 @@ def bar(accelerations, dt, alpha):
     return shortening
 
 
+@pytest.mark.heavy
 def test_two_blocks_pressed_together(tmp_path):
     """Without Poisson's effect two blocks are a bar; the published numbers, 0.13 % below its, are
     between those of tetrahedra of order 1 of two sizes. Its direction is vertical here.

@@ -377,6 +377,7 @@ def test_at_the_limits_of_the_stiffnesses_a_dam_stands(settings):
     assert dj.run(dj.case("dam", n_joint=20, **settings)).verdict == "stands"
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("modulus", [2e7, 1e20])
 def test_within_the_range_of_moduli_a_dam_stands(modulus):
     """Also with a rigid body, as of a published foundation."""

@@ -102,6 +102,7 @@ def flipped(whole, step=1):
         yield bytes(damaged)
 
 
+@pytest.mark.heavy
 def test_an_entry_with_a_changed_bit_is_not_read(entry, monkeypatch):
     """Wherever it is: checksum, key, tree, the arrays' shapes and numbers."""
     file, _ = entry
@@ -128,6 +129,7 @@ def test_an_entry_with_a_changed_bit_is_replaced(entry):
     assert cache.condensed_bodies(load("a", SMALL))[1] is None  # replaced
 
 
+@pytest.mark.heavy
 def test_a_value_with_a_changed_bit_is_computed_again(tmp_path, monkeypatch):
     """Every bit of the entry, and every length."""
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path))
@@ -152,6 +154,7 @@ def test_a_value_of_another_key_or_in_a_pipe_is_computed_again(tmp_path, monkeyp
     assert storage.cached("variables", "a", lambda: 1) == 1
 
 
+@pytest.mark.heavy
 def test_a_run_with_any_damaged_entry_has_the_same_result(tmp_path, monkeypatch):
     """All kinds of entries that a run leaves; a value of the case that is another valid one."""
     small = [word for name, size in SMALL.items() for word in ("--set", f"{name}={size}")]
@@ -228,6 +231,7 @@ def test_the_least_recently_used_files_are_removed(tmp_path, monkeypatch):
     assert sorted(file.stem for file in tmp_path.iterdir()) == ["b", "d"]
 
 
+@pytest.mark.heavy
 def test_a_command_with_cached_data_does_not_start_gmsh(tmp_path, monkeypatch):
     """Parameters and the case are read from the cache, and give the same bytes."""
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path / "cache"))

@@ -45,6 +45,7 @@ def test_damjoint_and_gmsh_read_a_case_alike(path):
     assert texts == expected | {n: [v] for n, v in ours.texts.items()}
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("name", ["lifts", "monoliths", "valley_blocks", "ssnp143", "ssnp143c"])
 def test_gmsh_and_getdp_read_the_block_of_a_joint(tmp_path, name):
     """Struct Joint::NAME [ ... ] is a part of the language of both."""
@@ -344,6 +345,7 @@ def mu_of(*words):
     return [joint["mu"] for joint in load("lifts", settings(words)).joints]
 
 
+@pytest.mark.heavy
 def test_a_value_of_one_joint_is_set_by_its_name():
     """As messages print it or as in a case file; beside a value for all it is the one of its joint,
     in either order; a list that comes later, as of `critical --of strength`, replaces it.

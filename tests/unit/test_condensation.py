@@ -10,6 +10,7 @@ from damjoint.fem.gluing import Gluing
 from damjoint.input.resolve import load
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "name, settings",
     [

@@ -32,6 +32,7 @@ def test_two_intensities_have_the_curve_through_their_shares():
     assert (high[0], low[1]) == pytest.approx((0.5, 0.5), abs=1e-9)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("scatter, most", [(0.0, 100), (0.35, 79)])
 def test_the_interval_covers_the_median_of_rows_that_depend_on_their_record(scatter, most):
     """100 studies of 12 records at 8 scales; scatter: part of the dispersion 0.4 between records.

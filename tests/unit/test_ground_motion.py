@@ -32,6 +32,7 @@ def test_spectrum_of_a_step_is_that_of_the_closed_form():
         assert_allclose(found, 2 * overshoot, rtol=5e-3)
 
 
+@pytest.mark.heavy
 def test_spectrum_of_a_sine_at_resonance_and_of_a_stiff_oscillator():
     times = np.linspace(0, 40, 8001)
     wave = np.sin(2 * np.pi * times)  # period 1 s

@@ -60,6 +60,7 @@ def area(x, y):
     return np.sum((y[1:] + y[:-1]) / 2 * np.diff(x))
 
 
+@pytest.mark.heavy
 def test_tension_peaks_at_the_strength_and_its_work_is_the_fracture_energy():
     opening = np.concatenate([[0], np.geomspace(1e-9, 0.3, 1500)])
     answer = along([(d, 0, 0) for d in opening])

@@ -131,6 +131,7 @@ def test_random_path_against_the_closed_form(hardening):
         assert_allclose(answer[name], column, rtol=1e-9, atol=1e-9 * scale, err_msg=name)
 
 
+@pytest.mark.heavy
 def test_sawing_takes_off_what_was_open():
     """A saw of 3e-8 m at t = 2, half of it at 1.5. Contact begins where the saw has left off: at
     -3e-8 m where the joint was closed, at -2e-8 m where it was open by 1e-8 m; beyond, the tension

@@ -136,6 +136,7 @@ def test_a_constant_outcome_has_no_sensitivity():
     assert sampling.sensitivity(np.arange(4.0), np.array([5, 4, 1, np.nan])) == -1
 
 
+@pytest.mark.heavy
 def test_sobol_indices_of_a_function_with_an_interaction():
     """Of Ishigami's function with a = 7, b = 0.1, in closed form."""
     design = sampling.sobol_design(2048, 3, seed=1)

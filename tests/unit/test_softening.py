@@ -54,6 +54,7 @@ def test_pure_opening_is_czm_exp_reg(law_name):
     assert_allclose(getdp["sigma_n"], expected, rtol=1e-12)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("curve", CURVES)
 @pytest.mark.parametrize("law_name", further(1, ["bond", "rupture"]))
 def test_opening_has_the_strength_the_curve_and_the_energy(law_name, curve):
@@ -82,6 +83,7 @@ def test_sliding_has_the_strength_the_curve_and_the_energy(curve, pressure):
     assert above == pytest.approx(G_T, rel=1e-5)  # of the trapezoidal rule
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("curve", further(1, CURVES))
 def test_both_modes_together_dissipate_both_energies(curve):
     """Where opening and slip do the same damage; where one of them does less, its strength is lost
