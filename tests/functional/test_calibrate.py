@@ -85,6 +85,7 @@ def test_a_linear_parameter_has_the_estimate_of_linear_regression(tmp_path):
     assert answer.squares == pytest.approx(np.sum((wanted - e * slope) ** 2), rel=1e-6)
 
 
+@pytest.mark.heavy
 def test_derivatives_are_those_of_differences_without_their_runs():
     """Crest and piezometer with modulus, temperature and drains, direct; with the width of the
     base by differences; of a prior in closed form.
@@ -152,6 +153,7 @@ def test_a_missing_drain_is_noticed_in_the_residuals(tmp_path, command):
     assert code == 0 and "the residuals are those of the given standard deviations" in out
 
 
+@pytest.mark.heavy
 def test_files_repeat_the_calibrated_run(tmp_path, command, texts_drawn):
     dam = dj.case("dam", **DRAINED)
     file = write(measured(dam, instruments(6, crest_ux=1e-4, head_10=0.5)), tmp_path / "m.csv")

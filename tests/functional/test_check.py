@@ -119,6 +119,7 @@ def test_a_factor_below_the_required_one_fails(solve, setting, message):
         assert (stricter.row["verdict"], stricter.row["why"]) == ("fail", expected)
 
 
+@pytest.mark.heavy
 @pytest.mark.usefixtures("no_pictures")
 def test_without_required_factors_the_verdict_is_not_checked(command, combinations, tmp_path):
     """Even with a sliding factor of 0.35, under a law without friction."""
@@ -162,6 +163,7 @@ def test_a_dam_that_slides_below_its_last_level_fails(command, combinations, tmp
     assert "did not reach the last level" in out
 
 
+@pytest.mark.heavy
 def test_a_dam_that_stops_under_a_part_of_the_earthquake_fails(command, tmp_path):
     """At constant level T grows with the earthquake."""
     weak = "law=bond", "sigma_max=0", "adhesion=0", "mu=0.8", "k_h=0.3", "n_joint=12"
@@ -198,6 +200,7 @@ def test_a_run_under_a_partial_load_does_not_pass(solve):
     assert len(full.rows) == 3
 
 
+@pytest.mark.heavy
 def test_a_second_crack_in_equilibrium_has_its_own_row(command, tmp_path):
     """The drains stop the shorter crack; the longer one is checked as well."""
     dam = "dam_base=30", "uplift=cracked", "drains=1", "drain_x=6", "law=bond", "sigma_max=0"
@@ -498,6 +501,7 @@ def test_only_the_joint_that_fails_fails(solve):
     assert not [line for line in lines if "lift 15 m, finite elements: fails" in line]
 
 
+@pytest.mark.heavy
 def test_picture_of_each_joint_of_a_dam_that_fails(solve, painted, tmp_path):
     """Also of a joint that does not fail."""
     weak = {"law": "bond", "mu": 0.3, "adhesion": 1e5, "lift_heights": (15.0,)}
@@ -546,6 +550,7 @@ def test_combinations_in_several_processes_have_the_same_tables(command, tmp_pat
     assert printed[0] == (printed[1][0], printed[1][1].replace("out2", "out1"))
 
 
+@pytest.mark.heavy
 @pytest.mark.usefixtures("no_pictures")
 def test_an_interrupted_check_continues(command, tmp_path, monkeypatch):
     """The finished case is read, with the same rows; the next one is computed."""
@@ -640,6 +645,7 @@ def test_long_names_of_combinations_are_wrapped_over_the_rows_of_each(solve):
     assert "FE" in rows[0] and "gravity" in rows[1] and "required" in rows[3]
 
 
+@pytest.mark.heavy
 def test_the_table_of_a_run_that_ends_early_fits_the_terminal(solve):
     """Methods with "partial load" are shortened, too; a name keeps a few characters."""
     settings = {"lift_heights": (12.0,), "required_SSF": 1.2, "adhesion": 0.0}

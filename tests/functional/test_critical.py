@@ -266,6 +266,7 @@ def test_a_strength_beyond_unstable_crack_growth_says_so():
     assert line in "\n".join(printed_lines(answer, search))
 
 
+@pytest.mark.heavy
 def test_only_hardening_set_by_the_user_counts_as_strength():
     """It carries the dam beyond T = mu N + c L; the default one is left out."""
     _, hard = search_result("c")
@@ -275,6 +276,7 @@ def test_only_hardening_set_by_the_user_counts_as_strength():
     assert answer.value == pytest.approx(slide_level_of_45_m_dam(0.6), abs=1e-3)
 
 
+@pytest.mark.heavy
 def test_critical_level_of_a_crushed_toe():
     _, answer = search_result("dam", settings=RUPTURE | {"f_c": 5e6}, tail_levels="3")
     assert answer.mode == "crushed toe" and answer.why.endswith("passes f_c = 5 MPa")
@@ -325,6 +327,7 @@ def test_bounds_of_statics(name, settings, limit, mode):
     assert highest_by_statics(strong, last)[0] > 1.2 * limit
 
 
+@pytest.mark.heavy
 def test_statics_confirms_a_level_near_its_bound(monkeypatch):
     """Only where the search does not progress; the value is that of an equilibrium."""
     monkeypatch.setattr(FailurePath, "advance", lambda self: vars(self).update(ended=True))
@@ -550,6 +553,7 @@ def test_a_search_that_ends_early_writes_its_results_so_far(monkeypatch, tmp_pat
     assert record["state"] == state in record["statement"]
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("case", ["dam", "lifts"])
 def test_a_toe_that_is_crushed_at_the_first_equilibrium_is_reported(command, tmp_path, case):
     """There is no critical level; a lower first level may have an equilibrium."""

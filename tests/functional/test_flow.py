@@ -79,7 +79,6 @@ def test_monotone_filling_with_flow_does_not_depend_on_the_steps(solve, name, st
     )
 
 
-@pytest.mark.heavy
 def test_the_flux_is_the_cube_of_the_aperture(solve):
     """Closed joint."""
     q = [solve("e", "2", aperture_min=w)[0].history["flux"][-1] for w in (1e-8, 3e-8)]

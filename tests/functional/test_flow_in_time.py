@@ -271,7 +271,6 @@ def test_drains_take_water():
     assert history["water"] - history["water_in"] == pytest.approx(2.8e-4, rel=1e-9)
 
 
-@pytest.mark.heavy
 def test_water_at_drains_of_part_effect():
     """A slot that fills: e times its pressure with drains of full effect plus 1 - e times that
     without drains, with steps of any length; in the end that of steady flow, to rounding.

@@ -262,7 +262,6 @@ def test_files_that_are_made_are_current(name, tmp_path):
         assert (tmp_path / f"{name}.{kind}").read_text() == stored
 
 
-@pytest.mark.heavy
 def test_another_dimension_is_refused(project):
     """The regions of a geometry of one's own are those of one dimension."""
     command = [

@@ -400,7 +400,6 @@ def test_what_a_mesh_in_3d_lacks_is_noted(solid, written):
     assert f"weight 619.8 MN; under water: {under}" in understood(load(written(solid, SPACE)))
 
 
-@pytest.mark.heavy
 def test_a_support_or_load_without_a_region_is_refused(solid, plane, written):
     """It would not act."""
     mesh = replace(solid, regions={n: r for n, r in solid.regions.items() if n != "z faces"})
@@ -440,7 +439,6 @@ def is_line(text, group):
     return len(words) == 7 and words[1] == "1" and words[3] == group
 
 
-@pytest.mark.heavy
 def test_a_point_of_two_groups_is_one_element(tmp_path):
     """Format MSH 2.2 has it twice, once for each group: a force on it would be twice as large."""
     path = write_blocks(tmp_path / "own.msh", BLOCK, BASE)

@@ -131,7 +131,6 @@ def test_readable_names_are_those_of_columns(run):
         np.testing.assert_array_equal(getattr(rows, name), rows[column])
 
 
-@pytest.mark.heavy
 def test_tables_for_pandas_and_xarray(run):
     """The same numbers; units and dimensions in xarray."""
     frame = run.to_pandas("history")
@@ -239,7 +238,6 @@ def test_names_of_cases_and_records_stay_in_their_variations(tmp_path):
         dj.sweep("dam", quake=0.05, record=[tmp_path / "wave.csv"], jobs=1)
 
 
-@pytest.mark.heavy
 def test_history_of_several_joints_for_xarray():
     size = {"n_joint": 10, "h_dam": 17, "h_found": 60}
     lifts = dj.run(dj.case("dam", levels=[30.0], lift_heights=[15.0], **size))

@@ -101,7 +101,6 @@ def test_a_run_prints_what_it_understood_of_a_geometry(command, tmp_path):
     assert err == f"damjoint: stepped: {note}\n" and "upstream 30 of 45 m" in note
 
 
-@pytest.mark.heavy
 def test_settings_of_a_preset_cause_no_note(command, mine):
     """But the user's own do, before or after it."""
     preset = 'Include "presets/usace_uplift.case"; levels() = {9};'

@@ -221,7 +221,6 @@ def test_the_points_of_each_joint_move_with_the_body_below_it(command, tmp_path,
         assert np.abs(at_joint).max() > 1e-4
 
 
-@pytest.mark.heavy
 def test_cells_of_order_2_have_their_midpoints(command, tmp_path):
     """Quadratic cells of VTK, the displacement at their further nodes that of the finite elements:
     the moment about the toe balances the weight's as curved sides do. Read back, only corners.
@@ -310,7 +309,6 @@ def test_fields_for_gmsh(folder):
         gmsh.clear()
 
 
-@pytest.mark.heavy
 def test_flux_in_the_fields(command, tmp_path):
     small = "--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4"
     assert command("run", "e", *small, "--levels", "6", "--no-picture")[0] == 0

@@ -221,6 +221,7 @@ def test_a_path_lost_from_an_earlier_state_is_followed_from_the_last_one(solve):
     assert result.last["level"] == pytest.approx(float(highest), rel=1e-4)
 
 
+@pytest.mark.heavy
 def test_a_step_over_a_limit_point_says_so_and_names_critical(solve):
     """A bond without tension stands at 48.7 m with 16 steps; its path ends at 48.49 m."""
     scene = replace(random_scene(31, 2).rising_from(7.5, 48.7), steps=16)

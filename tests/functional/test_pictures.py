@@ -96,7 +96,6 @@ def assert_nothing_is_clipped(figure):
         assert box.x1 <= figure.bbox.x1 + 1 and box.y1 <= figure.bbox.y1 + 1, part
 
 
-@pytest.mark.heavy
 @pytest.mark.parametrize("name", CASES)
 def test_lines_of_a_panel_differ_without_colors(figures, name):
     """In style of the line or marker."""
@@ -289,6 +288,7 @@ def test_a_half_that_its_process_does_not_draw_is_drawn_by_the_other():
     assert np.array_equal(joined(draw), 155 * np.ones((2, 2)))
 
 
+@pytest.mark.heavy
 def test_a_half_whose_process_is_killed_while_it_sends_is_drawn_by_the_other():
     mine = os.getpid()
 
@@ -303,6 +303,7 @@ def test_a_half_whose_process_is_killed_while_it_sends_is_drawn_by_the_other():
     assert np.array_equal(joined(draw), np.full((2000, 2000), 4))
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("sending", [False, True])
 def test_a_drawing_process_that_is_killed_is_an_error(runs, tmp_path, monkeypatch, sending):
     """Also while the process of its second half sends. The next picture is drawn."""

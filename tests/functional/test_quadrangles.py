@@ -106,6 +106,7 @@ def test_3d_contains_the_plane_solution(solve, pattern, flat):
     assert_allclose(three.history["crest_ux"], two.history["crest_ux"], rtol=1e-8)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "law, uplift", [("rupture", "flow"), ("bond", "flow"), ("friction", "cracked")]
 )

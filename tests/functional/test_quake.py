@@ -146,6 +146,7 @@ def body_inertia(quake, bodies):
     return resultant, toe
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "alpha, vertical, rock_mass",
     [
@@ -307,7 +308,6 @@ def test_free_vibration_decays_as_rayleigh_damping_says(tmp_path, braked):
     assert peaks[1] / peaks[0] == pytest.approx(expected, rel=2e-3)
 
 
-@pytest.mark.heavy
 def test_modes_are_named_by_the_mass_that_moves_along_each_axis(tmp_path):
     """The first mode of a dam sways; all of a block on a soft joint move it along an axis each."""
     record = smooth_record(tmp_path / "r.csv", 1.0)
@@ -899,6 +899,7 @@ def thrown(tmp_path, **settings):
     return under_way, heights
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("dt", [1e-3, pytest.param(5e-4, marks=pytest.mark.heavy)])
 def test_an_impact_does_not_depend_on_the_step(tmp_path, dt):
     """A block that lands on an elastic joint rises as high as v^2/(2 g), also by steps of three

@@ -91,7 +91,6 @@ def test_thin_water_is_the_steady_flow_of_the_moment(record):
     assert seen > 0.1 * static.max()
 
 
-@pytest.mark.heavy
 def test_drains_of_part_effect_keep_the_pressure_of_a_closed_joint(record):
     """It does not open: water that is stored is at rest in every step, as before the earthquake."""
     drains = {"drains": 1.0, "drain_x": 5.0, "drain_effectiveness": 0.6, "n_joint": 6.0}

@@ -39,6 +39,7 @@ def of_critical(case, *names):
     return answer.value, {row.name: row.derivatives["critical_level"] for row in rows}
 
 
+@pytest.mark.heavy
 def test_the_critical_level_of_a_dam_that_slides():
     """In closed form; elastic values do not matter."""
     case = dj.case("dam", levels=[30, 36], mu=0.6, **SLIDES)

@@ -120,7 +120,6 @@ def test_newton_finds_the_flow_of_the_secants(model, monkeypatch):
     assert few < many
 
 
-@pytest.mark.heavy
 def test_it_resists_more():
     """Under a flood: less leaks, the Reynolds number is smaller, and nothing is noted."""
     settings = FILM | {"time_unit": 600.0, "aperture_min": 2e-3}

@@ -87,7 +87,6 @@ def test_solution(system, method):
     assert matrix @ solution == pytest.approx(loads, rel=1e-11, abs=1e-12)
 
 
-@pytest.mark.heavy
 def test_a_library_that_does_not_load_is_compiled_anew(tmp_path, monkeypatch):
     if factor.is_slow():
         pytest.skip("MUMPS")
