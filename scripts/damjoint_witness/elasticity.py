@@ -153,8 +153,8 @@ class Dam:
         for face in self.faces:
             for sides in body.solid.sides_where(self.on(face.foot, face.top), body.order):
                 total += self.on_face(body, sides, face, loads)
-        for sides, level in self.level_faces(body, loads):
-            weight = v["rho_water"] * v["g"] * (level - sides.corners[0, 0, 1])
+        for sides, depth in self.level_faces(body, loads):
+            weight = v["rho_water"] * v["g"] * depth
             total += body.side_load(sides, [0.0, -weight, 0.0])
         for point, force in loads.lines().values():
             total += self.on_line(body, point, force)
@@ -176,10 +176,11 @@ class Dam:
         ]
 
     def level_faces(self, body: Stiffness, loads: Loads) -> Iterator[tuple[Sides, float]]:
-        """Yield level faces of a body under water, and its level: the crest, with floor_water the
-        reservoir's floor and the bed of the tailwater.
+        """Yield level faces of a body under water, and its depth above them: the crest, with
+        floor_water the reservoir's floor and the bed of the tailwater; uniform: as if at y = 0.
         """
         v = self.values
+        uniform = v["face_load"] == "uniform"
         if self.request.geometry:
             return
         whole = section_above_base(v)
@@ -191,9 +192,9 @@ class Dam:
             edges += [((-far, 0.0), (0.0, 0.0), loads.level)]
             edges += [((base, toe_y), (base + far, toe_y), loads.tail)]
         for start, end, level in edges:
-            if level > start[1]:
+            if (depth := level - (0.0 if uniform else start[1])) > 0:
                 for sides in body.solid.sides_where(self.on(start, end), body.order):
-                    yield sides, level
+                    yield sides, depth
 
     def on_face(self, body: Stiffness, sides: Sides, face: Face, loads: Loads) -> Array:
         """Return the forces of water, upstream also of silt, on a straight face of a body."""

@@ -51,7 +51,8 @@ SCENES = {
     "--set tolerance=1e-4 --levels 36",
     "uniform pressure": "run dam --set face_load=uniform --set force_y=2e5 --set force_face="
     "downstream --set force_at=20 --set rho_found=2600 --set in_situ=0 --set neck_height=6 --set "
-    "neck_batter=2 --set quadrature=published --set joint_head_offset=1 --levels 20",
+    "neck_batter=2 --set quadrature=published --set joint_head_offset=1 --set floor_water=1 "
+    "--set joint_slope=-4 --levels 20",
     "fading drains": "run dam --set dam_height=80 --set dam_base=60 --set uplift=cracked --set "
     "drains=1 --set drain_x=6 --set sigma_max=0 --levels 60,78",
     "flood of blocks": "run monoliths --run-geo --set uplift=flow --set time_unit=60 --set "
