@@ -70,6 +70,8 @@ MOST_REPEATED = 3
 #: Relative length of the increments of the path that is compared with one on which a branch has
 #: ended.
 SHORTER_RISE = 0.5
+#: The same, longer.
+LONGER_RISE = 1.5
 #: First level of the path that begins lower, over that of the case [-].
 LOWER_BEGIN = 0.6
 #: The level up to which the levels are prescribed to pass over a growth, over that of the growth.
@@ -334,6 +336,10 @@ class Search:
         # the growth of a single point may be passed over
         if (result.why and result.after) or (grows and first.releases_shear):
             checks = [(first, ways_over_growth(first, whole is first)), *checks]
+        fallen = path.points[-1].level < (1 - FALL) * path.highest
+        falls = path.water_withdraws and fallen and not path.leads_higher
+        if falls:  # which points close again depends on the increments
+            checks.append((path, [{"case": lower_begin(path.case)}, {"share": LONGER_RISE}]))
         if certain:
             others = (self.otherwise(*check) for check in checks)
             other = next(filter(None, others), None)
@@ -341,9 +347,7 @@ class Search:
         if path.begun_by_run and point is path.points[0]:
             result = replace(result, why="", doubt=falls_at_once(point))
         if path.water_withdraws:
-            fallen = path.points[-1].level < (1 - FALL) * path.highest
-            ends = fallen and not path.leads_higher
-            why, doubt = (withdrawn(path), "") if ends else ("", withdrawn(path))
+            why, doubt = (withdrawn(path), "") if falls else ("", withdrawn(path))
             result = replace(result, why=why, doubt=doubt)
         return result if certain else replace(result, why="", doubt=by_increments(other or path))
 
