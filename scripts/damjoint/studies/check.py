@@ -227,8 +227,7 @@ def hand_calculation(result: Results, alone: bool = True) -> GravityMethod | Non
     """
     case, last = result.case, result.last
     if case.geometry:
-        applies = not obstacle(result, alone)
-        return gravity.of_state(case, result.at(), last) if applies else None
+        return gravity.of_state(case, result.at(), last) if last and alone else None
     if last and (case["drive"] != "level" or last["time"] > case.times[-1]):
         return gravity.at(case, last["time"], last["level"])
     return gravity.at(case, case.times[-1])
