@@ -57,7 +57,6 @@ def test_resultants_without_flow(solve, name, levels, tail_levels, settings):
 
 
 @pytest.mark.heavy
-@pytest.mark.heavy
 @pytest.mark.parametrize(
     "name", ["e", "g", *(pytest.param(name, marks=pytest.mark.heavy) for name in "fh")]
 )

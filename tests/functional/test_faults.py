@@ -303,7 +303,6 @@ NESTED = "[" * 100_000 + "]" * 100_000
 
 
 @pytest.mark.heavy
-@pytest.mark.heavy
 @pytest.mark.parametrize(
     "old, new",
     further(
@@ -493,7 +492,6 @@ def test_a_getdp_run_that_exceeds_the_memory_is_refused(command, monkeypatch):
     assert code == 1 and "need about" in err and len(err.splitlines()) == 1
 
 
-@pytest.mark.heavy
 @pytest.mark.heavy
 @pytest.mark.parametrize(
     "engine, streams",

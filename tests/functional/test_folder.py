@@ -20,7 +20,6 @@ BARE = (*SMALL, "--no-fields", "--no-picture")
 
 
 @pytest.mark.heavy
-@pytest.mark.heavy
 @pytest.mark.parametrize("engine", [pytest.param("getdp", marks=pytest.mark.heavy), "condensed"])
 def test_files_of_the_user_in_the_folder_stay(command, tmp_path, engine):
     """Also in work/ and fields/, beside an earlier run."""
@@ -40,7 +39,6 @@ def test_files_of_the_user_in_the_folder_stay(command, tmp_path, engine):
     assert all((tmp_path / "out" / name).read_text() == "mine" for name in mine)
 
 
-@pytest.mark.heavy
 @pytest.mark.heavy
 @pytest.mark.parametrize(
     "words",

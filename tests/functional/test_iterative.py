@@ -58,7 +58,6 @@ def assert_same(one, other):
 
 
 @pytest.mark.heavy
-@pytest.mark.heavy
 @pytest.mark.parametrize(
     "law, uplift",
     [

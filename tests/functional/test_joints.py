@@ -87,7 +87,6 @@ def test_gravity_method_lift_by_lift(joint):
 
 
 @pytest.mark.heavy
-@pytest.mark.heavy
 @pytest.mark.parametrize(
     "weakest", [3, *(pytest.param(k, marks=pytest.mark.heavy) for k in (1, 2))]
 )

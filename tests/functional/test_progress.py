@@ -106,7 +106,6 @@ def test_commands_print_lines(command, frequent, words, pattern):
 
 
 @pytest.mark.heavy
-@pytest.mark.heavy
 @pytest.mark.parametrize(
     "words",
     [

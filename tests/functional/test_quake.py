@@ -236,7 +236,6 @@ ELASTIC = DAM | {"adhesion": 1e12}
 
 
 @pytest.mark.heavy
-@pytest.mark.heavy
 @pytest.mark.parametrize("alpha", [-0.05, pytest.param(0.0, marks=pytest.mark.heavy)])
 def test_the_error_falls_with_the_square_of_the_step(tmp_path, alpha):
     record = smooth_record(tmp_path / "r.csv", 2.0, duration=0.64)
@@ -346,7 +345,6 @@ def test_joint_dashpots_of_a_closed_joint(tmp_path):
 
 
 @pytest.mark.heavy
-@pytest.mark.heavy
 @pytest.mark.parametrize(
     "mode, uplift",
     [("zero", "imposed"), pytest.param("unchanged", "cracked", marks=pytest.mark.heavy)],
@@ -450,7 +448,6 @@ def test_linear_solvers_agree(tmp_path, monkeypatch, other):
     assert slips[1] == pytest.approx(slips[0], rel=1e-6)
 
 
-@pytest.mark.heavy
 @pytest.mark.heavy
 @pytest.mark.parametrize(
     "pattern, order", [("layers", 1.0), pytest.param("split", 2.0, marks=pytest.mark.heavy)]
@@ -665,7 +662,6 @@ def test_two_records_of_one_name_are_refused(refused, case_file, tmp_path):
     assert "must be given once, and have its own name" in message
 
 
-@pytest.mark.heavy
 @pytest.mark.heavy
 @pytest.mark.parametrize("engine", ["condensed", pytest.param("getdp", marks=pytest.mark.heavy)])
 def test_from_python_an_earthquake_is_what_the_command_writes(command, case_file, tmp_path, engine):

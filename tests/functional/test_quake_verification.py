@@ -150,7 +150,6 @@ LIFT = {"lift_heights": (20.0,), "uplift": ("flow", "cracked")}
 
 
 @pytest.mark.heavy
-@pytest.mark.heavy
 @pytest.mark.parametrize(
     "settings",
     [

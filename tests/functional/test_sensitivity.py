@@ -118,7 +118,6 @@ EXACT, OF_SIZE = 1e-6, 1e-8
 
 
 @pytest.mark.heavy
-@pytest.mark.heavy
 @pytest.mark.parametrize(
     "uplift",
     [

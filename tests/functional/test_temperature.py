@@ -27,7 +27,6 @@ WARM = {"temperature_dam": -8.0, "temperature_linear": 15.0, "temperature_found"
 
 
 @pytest.mark.heavy
-@pytest.mark.heavy
 @pytest.mark.parametrize(
     "engine, solid",
     [

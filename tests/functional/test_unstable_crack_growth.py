@@ -18,7 +18,6 @@ SLENDER = {"dam_height": 40, "dam_base": 28.8, "E": 1e10, "h_found": 7, "sigma_m
 
 
 @pytest.mark.heavy
-@pytest.mark.heavy
 @pytest.mark.parametrize(
     "uplift", ["flow", *(pytest.param(u, marks=pytest.mark.heavy) for u in ("imposed", "cracked"))]
 )

@@ -270,7 +270,6 @@ def test_other_values_of_the_water_are_noticed(written, change):
 
 
 @pytest.mark.heavy
-@pytest.mark.heavy
 @pytest.mark.parametrize(
     "uplift, level, tail",
     [
