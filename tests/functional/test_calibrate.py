@@ -63,6 +63,7 @@ def write(measurements, path):
     return path
 
 
+@pytest.mark.heavy
 def test_a_linear_parameter_has_the_estimate_of_linear_regression(tmp_path):
     """The head at the drains is u - e (u - o), u that without drains and o their outlet: e is the
     weighted mean of regression, and its interval that of the normal distribution.

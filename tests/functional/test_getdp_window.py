@@ -240,13 +240,10 @@ def test_every_case_has_its_files_for_gmsh():
     assert names == set(WINDOWED) == {n for n in FILES["geo"] if not n.endswith(SHARED)}
 
 
+STATEMENTS = {name: read(data("cases") / f"{name}.case") for name in WINDOWED}
 #: Of a geometry of their own, or with a hydrograph
-OWN = [
-    name
-    for name in WINDOWED
-    if {"geometry", "hydrograph"}.intersection(read(data("cases") / f"{name}.case").texts)
-]
-SOLID = {name for name in OWN if load(name)["dim"] == 3}
+OWN = [n for n, case in STATEMENTS.items() if {"geometry", "hydrograph"}.intersection(case.texts)]
+SOLID = {name for name in OWN if STATEMENTS[name].defaults.get("dim") == 3}
 
 
 @pytest.mark.parametrize(

@@ -446,7 +446,7 @@ def test_a_check_of_a_single_case():
 @pytest.mark.parametrize(
     "name",
     [
-        as_heavy(name) if name in ("Reliability", "sweep") else name
+        as_heavy(name) if name in ("Reliability", "reliability", "sweep") else name
         for name in sorted({*library.__all__} - {"Case", "LAWS"})
     ],
 )

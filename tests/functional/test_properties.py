@@ -148,6 +148,7 @@ def in_units(case, units):
     return case, scaled
 
 
+@pytest.mark.heavy
 @few
 @given(joints, levels, st.sampled_from(["level", "crest"]), st.tuples(*[st.floats(-1, 1)] * 3))
 def test_results_do_not_depend_on_units(solve, joint, level, drive, powers):

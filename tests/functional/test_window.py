@@ -189,6 +189,7 @@ def test_only_what_matters_shows_and_followers_say_what_they_follow(open_window)
     assert user.session.tree.sheet.case["E_dam"] == 2e10
 
 
+@pytest.mark.heavy
 def test_results_and_saved_case_are_those_of_the_command(open_window, command, tmp_path):
     """The same bytes, from the command line and from the saved case file."""
     user = open_window("a", **SMALL)

@@ -223,6 +223,7 @@ def test_every_parameter_has_a_label_with_its_unit():
     assert set(names.split()) <= set(parameters.declared())
 
 
+@pytest.mark.heavy
 def test_an_independent_parameter_changes_nothing_else():
     """For each of them, a changed case equals a case loaded with the change."""
     common = {"law": "bond", "uplift": "drained"}
