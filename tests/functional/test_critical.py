@@ -61,7 +61,7 @@ def test_sliding_level(uplift):
     assert answer.mode == "sliding" and answer.confirmed and "the whole joint slips" in answer.why
 
 
-@pytest.mark.parametrize("wet", [False, True])
+@pytest.mark.parametrize("wet", further(1, [True, False]))
 def test_overturning_level(wet):
     """Without tension, above the crest by the trapezoid of pressure: 11.687 m dry, 10.019 m with
     uplift, where N acts at the toe; in the model no closer to it than the last integration point.

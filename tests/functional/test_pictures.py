@@ -400,6 +400,7 @@ def test_the_largest_opening_is_not_negative(runs):
     assert_allclose(opening.lines[0][0], 0.0)
 
 
+@pytest.mark.heavy
 def test_several_joints_are_shown_as_equals():
     """Curves and a row of a table for each; the heading does not speak for the first one."""
     run = dj.run(dj.case("dam", **COARSE, law="friction", levels=[40], lift_heights=[15, 30]))

@@ -11,6 +11,7 @@ from damjoint import cli
 from damjoint_witness import elasticity, network, statics, water, water_in_time
 from damjoint_witness.files import Files, read_table
 from damjoint_witness.reader import read
+from variants import further
 
 pytest.importorskip("skfem")
 
@@ -90,7 +91,7 @@ def found(check, folder, words):
     return list(check.violations(files, read(words), read_table(folder / "steps.csv")))
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", further(6, SCENES))
 def test_water_and_jumps_are_those_of_the_run(written, name):
     assert found(water, *written(name)) == []
     assert found(water_in_time, *written(name)) == []
