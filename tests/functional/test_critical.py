@@ -23,12 +23,13 @@ from damjoint import RunError, runner
 from damjoint.input.resolve import load, varied
 from damjoint.joint.interface import interface_of
 from damjoint.solver import path
-from damjoint.solver.path import FALL, PRECISION
+from damjoint.solver.path import PRECISION
 from damjoint.statics import gravity
 from damjoint.statics.verdict import highest_by_statics, verdict
 from damjoint.studies import critical_value, failure_path
-from damjoint.studies.critical import SHORTER_RISE, Search
+from damjoint.studies.critical import Search
 from damjoint.studies.critical_study import critical, printed_lines, table
+from damjoint.studies.critical_ways import SHORTER
 from damjoint.studies.failure_path import FailurePath
 from variants import further
 
@@ -306,7 +307,7 @@ def test_the_end_of_a_branch_above_which_a_run_stands_is_not_confirmed(monkeypat
     _, answer = search_result("c", settings={"pena_tang": 0.0}, levels="3,4")
     assert answer.growth == answer.value < 5.1 and not answer.confirmed
     level = (1 + critical_value.AFTER_GROWTH) * answer.value
-    assert answer.after == {critical_value.BY_RUN: pytest.approx(level)}
+    assert answer.stands_at == pytest.approx(level) and not answer.after
     assert f"but a run stands at {level:.6g} m" in answer.doubt
 
 
@@ -473,9 +474,9 @@ def test_a_level_beyond_unstable_growth_is_not_confirmed_if_other_ways_do_not_le
     }
     ways, follow = [], Search.from_beginning
 
-    def recorded(self, path, share=1.0, unstable_fall=FALL, case=None, **precise):
-        ways.append((id(path), share, unstable_fall, case and case.levels))
-        return follow(self, path, share, unstable_fall, case, **precise)
+    def recorded(self, path, way, *precision):
+        ways.append((path, way))
+        return follow(self, path, way, *precision)
 
     monkeypatch.setattr(Search, "from_beginning", recorded)
     _, answer = search_result("dam", "level", settings, [2.285], "1.07")
@@ -772,7 +773,7 @@ def test_a_path_begins_as_a_run_where_single_steps_do_not_lead(monkeypatch):
 def test_a_joint_that_loses_its_cohesion_is_repeated_to_half_of_the_precision(monkeypatch):
     """Four confirmed levels of one dam were 1.13e-4 apart, each the same as its repetition."""
     found = {}
-    again = lambda self, path, share, precision: found.update(share=share, precision=precision)
+    again = lambda self, path, way, precision: found.update(way=way, precision=precision)
     monkeypatch.setattr(Search, "from_beginning", again)
     for sigma_max, part in ((0, 0.5), (1e5, 1.0)):
         settings = {"law": "bond", "adhesion": 2.5e5, "sigma_max": sigma_max, "n_joint": 10}
@@ -781,7 +782,7 @@ def test_a_joint_that_loses_its_cohesion_is_repeated_to_half_of_the_precision(mo
         whole.starts = [0]  # passes over the end of a branch
         assert whole.loses_cohesion == (not sigma_max)
         search.repeated(whole)
-        assert found == {"share": SHORTER_RISE, "precision": part * PRECISION}
+        assert found == {"way": SHORTER, "precision": part * PRECISION}
 
 
 #: A stiff, brittle mixed joint that the weight alone breaks (static loads of random quake 152-10).

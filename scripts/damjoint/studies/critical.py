@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import chain, zip_longest
-from typing import Any, TypeAlias
 
 import numpy as np
 from scipy.optimize import bisect
@@ -26,13 +25,14 @@ from ..joint.interface import interface_of
 from ..model.results import Results, row_of_joint
 from ..session import study_end
 from ..solver.load_stepper import LoadStepper
-from ..solver.path import FALL, PRECISION, RISE, ROUGH, SURE, Point
+from ..solver.path import PRECISION, RISE, ROUGH, SURE, Point
 from ..statics.statement import REASONS, words_of_bound
 from ..statics.verdict import bound, highest_by_statics
 from ..threads import limited_threads
 from ..units import FORCES, STRESSES, with_unit
 from .critical_gravity import GravityValues
-from .critical_value import AFTER_GROWTH, BY_RUN, CriticalValue
+from .critical_value import AFTER_GROWTH, CriticalValue
+from .critical_ways import SHORTER, Way, falls_by_water, repeats_whole, ways_to_confirm
 from .critical_words import (
     beyond_limit,
     by_increments,
@@ -67,19 +67,6 @@ DRIVE = ("drive", "drive_begin", "drive_end", "drive_by")
 #: depend on them.
 MOST_REPEATED = 3
 
-#: Relative length of the increments of the path that is compared with one on which a branch has
-#: ended.
-SHORTER_RISE = 0.5
-#: The same, longer.
-LONGER_RISE = 1.5
-#: First level of the path that begins lower, over that of the case [-].
-LOWER_BEGIN = 0.6
-#: The level up to which the levels are prescribed to pass over a growth, over that of the growth.
-ABOVE_GROWTH = 1.02
-#: Factor by which the fall that is unstable growth is changed, down and up [-]: it varies by a
-#: quarter with the increments.
-FALL_FACTOR = 1.35
-
 #: How unstable crack growth is passed over: whether by relaxation.
 AFTER = {"by displacement": False, "by relaxation": True}
 
@@ -92,9 +79,6 @@ ABOVE = AFTER_GROWTH
 
 #: Relative distance within which the bound of statics confirms a critical level below it.
 NEAR_BOUND = 0.02
-
-#: Arguments of `Search.from_beginning`: how a path is followed otherwise.
-Way: TypeAlias = dict[str, Any]
 
 #: The smallest value of a parameter that has to be positive.
 TINY = 1e-30
@@ -289,67 +273,78 @@ class Search:
 
     def level(self) -> CriticalValue:
         """The highest level of the path, beyond the case's highest level."""
+        first, grows, other = self.level_path()
+        if first.reached:
+            doubt = f"there is an equilibrium at {first.target:.4g} m, twice the dam's height"
+            return CriticalValue(None, "", "", doubt, first.points[-1])
+        result, path = self.at_limit(first, grows)
+        return self.confirmation(first, path, result, grows, other) if result.point else result
+
+    def level_path(self) -> tuple[FailurePath, bool, FailurePath | None]:
+        """The path to the critical level; whether a crack grows unstably there, see `finished`; and
+        the last path by shorter increments, if they do not lead to the same level.
+        """
         last = int(np.argmax(self.case.levels)) + 1
         levels, tails = self.case.levels[:last], self.case.tail_levels[:last]
         below = last < len(self.case.levels)
         case = varied(self.case, self.settings, levels, tails) if below else self.base
         # not the limit itself, from which no increment leads on
         most = (1 - PRECISION) * case.highest_level
-        path = self.path(max(case.levels), case, most, to_growth=True)
-        paths = list[FailurePath]()
+        path, paths = self.path(max(case.levels), case, most, to_growth=True), list[FailurePath]()
+        other: FailurePath | None = None
         for _ in range(MOST_REPEATED):
-            path, grows = finished(path)
+            path, grows = finished(other or path)
             other = None if path.reached else self.repeated(path)
-            paths += [path, *([other] if other else [])]
-            certain, path = other is None, other or path
-            if certain:
-                break
-        else:  # the lowest of their levels, on the safe side
-            complete = [path for path in paths if not path.unfinished] or paths
-            path, grows = finished(min(complete, key=lambda path: path.highest))
-        if path.reached:
-            beyond = f"{path.target:.4g} m, twice the dam's height"
-            return CriticalValue(
-                None, "", "", f"there is an equilibrium at {beyond}", path.points[-1]
-            )
-        whole = path if repeats_whole(path) else None
-        point = path.points[path.top] if path.admissible else None
-        first, after, ends = path, dict[str, float](), grows and path.ended
-        if point and grows:
+            if other is None:
+                return path, grows, None
+            paths += path, other
+        # the lowest of their levels, on the safe side
+        complete = [path for path in paths if not path.unfinished] or paths
+        return *finished(min(complete, key=lambda path: path.highest)), other
+
+    def at_limit(self, first: FailurePath, grows: bool) -> tuple[CriticalValue, FailurePath]:
+        """The result at the highest level of a path, with the unstable crack growth there, and the
+        path, continued beyond it.
+        """
+        if not first.admissible:
+            return self.result(None, first, None), first
+        point, after, path = first.points[first.top], dict[str, float](), first
+        if grows:
             after, path = self.after_growth(first)
-        result = self.result(point.level if point else None, path, point)
-        if point is None:
-            return result
-        if after or ends:
+        result = self.result(point.level, path, point)
+        if after or (grows and first.ended):
             mode = GROWTH if after else result.mode
             result = replace(result, mode=mode, why=beyond_limit(path), doubt="", after=after)
             result = replace(result, growth=point.level)
             if not after and path.top + 1 == len(path.points):
                 result = self.with_run(path, result)
-            ways = list[Way]()
-        else:
-            ways = further_ways(path, whole is path, mechanism=bool(result.why))
-            result = result if result.why else self.with_end_of(path, result)
-        if first.weighed_with_water:
-            ways.append({"case": lower_begin(path.case)})
-        checks = [(path, ways)] if result.why and not result.after else []
-        # the growth of a single point may be passed over
-        if (result.why and result.after) or (grows and first.releases_shear):
-            checks = [(first, ways_over_growth(first, whole is first)), *checks]
-        fallen = path.points[-1].level < (1 - FALL) * path.highest
-        falls = path.water_withdraws and fallen and not path.leads_higher
-        if falls:  # which points close again depends on the increments
-            checks.append((path, [{"case": lower_begin(path.case)}, {"share": LONGER_RISE}]))
-        if certain:
-            others = (self.otherwise(*check) for check in checks)
-            other = next(filter(None, others), None)
-            certain = other is None
-        if path.begun_by_run and point is path.points[0]:
-            result = replace(result, why="", doubt=falls_at_once(point))
+        return result, path
+
+    def confirmation(
+        self,
+        first: FailurePath,
+        path: FailurePath,
+        result: CriticalValue,
+        grows: bool,
+        other: FailurePath | None,
+    ) -> CriticalValue:
+        """A result of `at_limit`, confirmed or not: by the end of its path, if it has no mechanism,
+        and by other ways, if shorter increments have led to no other path, see `level_path`.
+        """
+        mechanism = bool(result.why)
+        if not mechanism and result.growth is None:
+            result = self.with_end_of(path, result)
+        if other is None:
+            ways = ways_to_confirm(first, path, result, grows, mechanism)
+            paths = (self.from_beginning(path, way) for path, way in ways)
+            other = next((path for path in paths if path), None)
+        if path.begun_by_run and result.point is path.points[0]:
+            result = replace(result, why="", doubt=falls_at_once(path.points[0]))
         if path.water_withdraws:
-            why, doubt = (withdrawn(path), "") if falls else ("", withdrawn(path))
+            words = withdrawn(path)
+            why, doubt = (words, "") if falls_by_water(path) else ("", words)
             result = replace(result, why=why, doubt=doubt)
-        return result if certain else replace(result, why="", doubt=by_increments(other or path))
+        return replace(result, why="", doubt=by_increments(other)) if other else result
 
     def repeated(self, path: FailurePath) -> FailurePath | None:
         """A path by shorter increments: from before its highest level, if its branch has led there;
@@ -358,42 +353,28 @@ class Search:
         """
         if repeats_whole(path):
             precision = PRECISION / 2 if path.loses_cohesion else PRECISION
-            return self.from_beginning(path, SHORTER_RISE, precision=precision)
+            return self.from_beginning(path, SHORTER, precision)
         other = path.repeated()
         if other:
             self.trials[-1] = replace(self.trials[-1], path=other)
         return other
 
-    def otherwise(self, path: FailurePath, ways: Sequence[Way]) -> FailurePath | None:
-        """The first path that leads to another highest level, of those by other ways; None if all
-        lead to the same.
-        """
-        paths = (self.from_beginning(path, **way) for way in ways)
-        return next((other for other in paths if other), None)
-
     def from_beginning(
-        self,
-        path: FailurePath,
-        share: float = 1.0,
-        unstable_fall: float = FALL,
-        case: Case | None = None,
-        precision: float = PRECISION,
+        self, path: FailurePath, way: Way, precision: float = PRECISION
     ) -> FailurePath | None:
         """The path by another way from its beginning on, to the first unstable growth if it is;
-        None if it leads to the same highest level.
-
-        share: of the level's rise that an increment aims at; unstable_fall: relative fall of the
-        level that is unstable growth; case: with other levels; precision: relative, up to which
-        levels are the same.
+        None if it leads to the same highest level, to a relative precision.
         """
-        rise, to_growth = share * path.rise, path.to_growth
+        case, to_growth = path.case, path.to_growth
+        if way.levels:
+            case = varied(case, {}, way.levels, way.tails)
         other = FailurePath(
-            *(case or path.case, path.interface, path.target),
+            *(case, path.interface, path.target),
             to_growth=to_growth,
-            rise=rise,
+            rise=way.share * path.rise,
             solver=path.solver,
         )
-        other.unstable_fall = unstable_fall
+        other.unstable_fall = way.unstable_fall
         other.follow(SURE)
         if to_growth and other.starts:
             other = other.first_branch()
@@ -689,7 +670,7 @@ class Search:
             return result
         if path.to_growth:
             result = replace(result, mode=GROWTH, why=beyond, doubt="")
-        return replace(result, growth=path.highest, after={BY_RUN: float(level)})
+        return replace(result, growth=path.highest, stands_at=float(level))
 
     def by_statics(self, failing: FailurePath) -> tuple[str, str, str]:
         """How an unconfirmed path fails, why, and at which joint, if there are several: its
@@ -730,53 +711,6 @@ def run_to(path: FailurePath, level: float) -> LoadStepper:
     for _ in run.steps():
         pass
     return run
-
-
-def repeats_whole(path: FailurePath) -> bool:
-    """Whether a path is repeated from its beginning on: where the level is that after the end of a
-    branch, or water enters the crack and no mechanism is found, or its points lose cohesion one by
-    one all the way.
-    """
-    lost = path.entering and (path.stops or path.water_withdraws)
-    return lost or path.loses_cohesion or bool(path.starts and path.top >= path.starts[0])
-
-
-def ways_over_growth(path: FailurePath, repeated: bool) -> list[Way]:
-    """Ways that may end at another unstable growth: by shorter increments, unless the path has been
-    repeated so, with another fall of the level that counts as growth, and from a lower level. A
-    point that releases its shear may be passed over by a step of the level, but by no increment of
-    a displacement: where it ends the path, also by levels up to above it, and by none.
-    """
-    ways: list[Way] = [] if repeated else [{"share": SHORTER_RISE}]
-    ways += [{"unstable_fall": fall} for fall in (FALL / FALL_FACTOR, FALL * FALL_FACTOR)]
-    ways.append({"case": lower_begin(path.case)})
-    case, levels = path.case, path.case.levels
-    if path.releases_shear and path.ended and path.has_last_loads(1.0):
-        tails = case.tail_levels
-        if sorted(levels) == list(levels):
-            ways.append({"case": varied(case, {}, (LOWER_BEGIN * levels[0],), tails[:1])})
-        above = ABOVE_GROWTH * path.highest
-        if max(levels) < above < case.highest_level:
-            ways.append({"case": varied(case, {}, (*levels, above), (*tails, tails[-1]))})
-    return ways
-
-
-def further_ways(path: FailurePath, repeated: bool, mechanism: bool) -> list[Way]:
-    """Ways that confirm a highest level, beside shorter increments: beyond unstable growth those
-    over it; where a branch ends and water enters the crack, each point of which turns the path,
-    from a lower level. repeated: see `ways_over_growth`; mechanism: whether one confirms it.
-    """
-    if not path.to_growth and path.growth_until(path.top + 1) is not None:
-        return ways_over_growth(path, repeated)
-    ends = path.entering and path.branch_ends and not mechanism
-    return [{"case": lower_begin(path.case)}] if ends else []
-
-
-def lower_begin(case: Case) -> Case:
-    """The case with a lower first level."""
-    first, *further = case.levels
-    levels = (LOWER_BEGIN * first, *(further or [first]))
-    return varied(case, {}, levels, case.tail_levels if further else 2 * case.tail_levels)
 
 
 def of_each(values: list[float]) -> Setting:

@@ -29,8 +29,11 @@ from ..statics.statement import statement
 from . import critical_picture as picture
 from . import sensitivity as sensitivities
 from .critical import Search, last_state
-from .critical_value import AFTER_GROWTH, BY_RUN, CriticalValue
+from .critical_value import AFTER_GROWTH, CriticalValue
 from .failure_path import critical_columns, row
+
+#: Name of the level at which a run stands, among those that are reached after unstable growth.
+BY_RUN = "a run stands at"
 
 
 def critical(
@@ -152,8 +155,8 @@ def growth_lines(answer: CriticalValue) -> list[str]:
     if answer.growth is None:
         return []
     lines = [f"first unstable crack growth: {answer.growth:.6g} m"]
-    if BY_RUN in answer.after:
-        lines.append(f"after it, not confirmed: {BY_RUN} {answer.after[BY_RUN]:.6g} m")
+    if answer.stands_at is not None:
+        lines.append(f"after it, not confirmed: {BY_RUN} {answer.stands_at:.6g} m")
     elif answer.after:
         low, high = min(answer.after.values()), max(answer.after.values())
         ways = "; ".join(f"{level:.6g} m {name}" for name, level in answer.after.items())
@@ -206,6 +209,7 @@ def content(search: Search, answer: CriticalValue) -> picture.Content:
 
 def as_json(search: Search, answer: CriticalValue) -> dict[str, Any]:
     """The entry `critical` of run.json."""
+    by_run = {} if answer.stands_at is None else {BY_RUN: answer.stands_at}
     return {
         "of": search.of,
         "value": answer.value,
@@ -213,7 +217,7 @@ def as_json(search: Search, answer: CriticalValue) -> dict[str, Any]:
         "mode": answer.mode,
         "joint": answer.joint,
         "first_unstable_growth": answer.growth,
-        "after_unstable_growth": dict(answer.after),
+        "after_unstable_growth": {**answer.after, **by_run},
         "events": answer.events,
         "confirmed": answer.why,
         "doubt": answer.doubt,

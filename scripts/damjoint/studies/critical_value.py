@@ -9,8 +9,6 @@ from ..solver.path import Point
 
 #: Relative difference up to which the levels agree that are reached after unstable crack growth.
 AFTER_GROWTH = 1e-3
-#: Name of a level after it at which a run stands, among those that are reached.
-BY_RUN = "a run stands at"
 
 
 @dataclass(frozen=True)
@@ -40,6 +38,8 @@ class CriticalValue:
     #: the highest levels that are reached after the unstable growth that ends the branch, by how it
     #: is passed over [m]
     after: Mapping[str, float] = field(default_factory=dict)
+    #: a level above the end of the branch at which a run stands [m]; None: none is known
+    stands_at: float | None = None
     #: the joint that fails, if there are several, and the events on the way
     joint: str = ""
     events: Sequence[str] = ()
@@ -50,6 +50,11 @@ class CriticalValue:
     def confirmed(self) -> bool:
         """Whether there is a critical value, and a mechanism or bound of statics beyond it."""
         return self.value is not None and bool(self.why)
+
+    @property
+    def leads_higher(self) -> bool:
+        """Whether there are equilibria at higher levels, after unstable growth."""
+        return bool(self.after) or self.stands_at is not None
 
     @property
     def failure(self) -> str:

@@ -1,0 +1,117 @@
+"""Other ways to a highest level, which have to lead to the same one for it to be confirmed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ..input.case import Case
+from ..solver.path import FALL
+from .critical_value import CriticalValue
+from .failure_path import FailurePath
+
+#: Relative length of the increments of the path that is compared with one on which a branch has
+#: ended.
+SHORTER_RISE = 0.5
+#: The same, longer.
+LONGER_RISE = 1.5
+#: First level of the path that begins lower, over that of the case [-].
+LOWER_BEGIN = 0.6
+#: The level up to which the levels are prescribed to pass over a growth, over that of the growth.
+ABOVE_GROWTH = 1.02
+#: Factor by which the fall that is unstable growth is changed, down and up [-]: it varies by a
+#: quarter with the increments.
+FALL_FACTOR = 1.35
+
+
+@dataclass(frozen=True)
+class Way:
+    """How a path is followed otherwise, from its beginning on."""
+
+    #: share of the level's rise that an increment aims at
+    share: float = 1.0
+    #: relative fall of the level that is unstable growth
+    unstable_fall: float = FALL
+    #: levels and tailwater that are prescribed [m]; empty: those of the case
+    levels: tuple[float, ...] = ()
+    tails: tuple[float, ...] = ()
+
+
+#: By shorter and by longer increments.
+SHORTER, LONGER = Way(SHORTER_RISE), Way(LONGER_RISE)
+
+
+def repeats_whole(path: FailurePath) -> bool:
+    """Whether a path is repeated from its beginning on: where the level is that after the end of a
+    branch, or water enters the crack and no mechanism is found, or its points lose cohesion one by
+    one all the way.
+    """
+    lost = path.entering and (path.stops or path.water_withdraws)
+    return lost or path.loses_cohesion or bool(path.starts and path.top >= path.starts[0])
+
+
+def ways_to_confirm(
+    first: FailurePath, path: FailurePath, result: CriticalValue, grows: bool, mechanism: bool
+) -> list[tuple[FailurePath, Way]]:
+    """The other ways that have to lead to the level of a result, with the path that each is
+    compared with.
+
+    first: the path to the level; path: the same, continued beyond it; grows: whether a crack grows
+    unstably there; mechanism: whether a mechanism confirms it.
+    """
+    repeated, ways = repeats_whole(first), list[tuple[FailurePath, Way]]()
+    # the growth of a single point may be passed over
+    if (result.why and result.leads_higher) or (grows and first.releases_shear):
+        ways += ((first, way) for way in over_growth(first, repeated))
+    if result.why and not result.leads_higher:
+        if result.growth is None:
+            further = at_end(path, repeated and path is first, mechanism)
+            ways += ((path, way) for way in further)
+        if first.weighed_with_water:
+            ways.append((path, lower_begin(path.case)))
+    if falls_by_water(path):  # which points close again depends on the increments
+        ways += (path, lower_begin(path.case)), (path, LONGER)
+    return list(dict.fromkeys(ways))
+
+
+def falls_by_water(path: FailurePath) -> bool:
+    """Whether the level of a path falls where the water withdraws, and none leads higher."""
+    fallen = path.points[-1].level < (1 - FALL) * path.highest
+    return path.water_withdraws and fallen and not path.leads_higher
+
+
+def over_growth(path: FailurePath, repeated: bool) -> Iterator[Way]:
+    """Ways that may end at another unstable growth: by shorter increments, unless the path has been
+    repeated so, with another fall of the level that counts as growth, and from a lower level. A
+    point that releases its shear may be passed over by a step of the level, but by no increment of
+    a displacement: where it ends the path, also by levels up to above it, and by none.
+    """
+    if not repeated:
+        yield SHORTER
+    yield from (Way(unstable_fall=fall) for fall in (FALL / FALL_FACTOR, FALL * FALL_FACTOR))
+    yield lower_begin(path.case)
+    levels, tails = path.case.levels, path.case.tail_levels
+    if path.releases_shear and path.ended and path.has_last_loads(1.0):
+        if sorted(levels) == list(levels):
+            yield Way(levels=(LOWER_BEGIN * levels[0],), tails=tails[:1])
+        above = ABOVE_GROWTH * path.highest
+        if max(levels) < above < path.case.highest_level:
+            yield Way(levels=(*levels, above), tails=(*tails, tails[-1]))
+
+
+def at_end(path: FailurePath, repeated: bool, mechanism: bool) -> Iterator[Way]:
+    """Ways beside shorter increments: beyond unstable growth those over it; where a branch ends and
+    water enters the crack, each point of which turns the path, from a lower level. repeated: see
+    `over_growth`; mechanism: whether one confirms the level.
+    """
+    if not path.to_growth and path.growth_until(path.top + 1) is not None:
+        yield from over_growth(path, repeated)
+    elif path.entering and path.branch_ends and not mechanism:
+        yield lower_begin(path.case)
+
+
+def lower_begin(case: Case) -> Way:
+    """The way from a lower first level."""
+    (first, *further), tails = case.levels, case.tail_levels
+    levels = (LOWER_BEGIN * first, *(further or [first]))
+    return Way(levels=levels, tails=tails if further else 2 * tails)
