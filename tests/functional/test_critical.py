@@ -632,6 +632,20 @@ def test_the_critical_level_does_not_depend_on_the_increments(settings):
 
 
 @pytest.mark.heavy
+def test_an_equilibrium_of_more_damage_than_the_next_one_is_not_between_two_points():
+    """It is of another branch: from the default levels 37.464 m was confirmed, and 37.419 m from
+    others.
+    """
+    dam = {"dam_height": 19.61, "dam_base": 16.06, "dam_crest": 1.673, "n_joint": 20.0}
+    dam |= {"E": 2.705e10, "E_found": 1.693e10, "nu": 0.2154, "law": "bond", "K_N": 8.465e11}
+    dam |= {"K_T": 5.16e11, "mu": 1.15, "sigma_max": 131200.0, "adhesion": 33120.0}
+    settings = dam | {"G_f": 41.9, "G_t": 1729.0, "uplift": "none"}
+    one, other = (search_result("dam", settings=settings, levels=at)[1] for at in (None, "17"))
+    assert one.confirmed and other.confirmed
+    assert one.value == pytest.approx(other.value, rel=path.PRECISION)
+
+
+@pytest.mark.heavy
 def test_water_that_enters_at_once_is_unstable_growth():
     """A crack that opens so far that more water flows in than closes it again: no point breaks, but
     the uplift grows by 6 % without a rise of the level.

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import takewhile
 from typing import Any, TypeVar
 
 import numpy as np
@@ -412,6 +413,13 @@ class Point:
         what they did up to another point: elastic unloading along the path already passed.
         """
         return self.level < begin.level and self.dissipation <= UNLOADING * begin.dissipation
+
+    def beyond(self, end: Point, begin: Point) -> bool:
+        """Whether more damage has grown than up to an end, both reached from the same begin: then
+        it is not between the two, but on another branch.
+        """
+        own, largest = (float((p.damage - begin.damage).sum()) for p in (self, end))
+        return own > (1 + SAME_JUMP) * largest + ROUND_OFF * float(begin.damage.sum())
 
     def differs(self, other: Point, begin: Point) -> bool:
         """Whether the state differs from another one, both reached from the same begin."""
@@ -941,7 +949,8 @@ class EquilibriumPath:
         if control is None:
             return []
         smallest = max(SMALLEST * length, self.negligible(a, control))
-        return self.along(a, control, length, smallest, b.control)[0]
+        new = self.along(a, control, length, smallest, b.control)[0]
+        return list(takewhile(lambda point: not point.beyond(b, a), new))
 
 
 def deviation(change: float, predicted: float, least: float) -> float:
