@@ -29,7 +29,7 @@ from damjoint.statics.verdict import highest_by_statics, verdict
 from damjoint.studies import critical_value, failure_path
 from damjoint.studies.critical import Search
 from damjoint.studies.critical_study import critical, printed_lines, table
-from damjoint.studies.critical_ways import SHORTER
+from damjoint.studies.critical_ways import SHORTER, Way
 from damjoint.studies.failure_path import FailurePath
 from variants import further
 
@@ -707,6 +707,21 @@ def test_the_branch_of_a_joint_that_releases_its_shear_ends_in_unstable_growth()
     _, answer = search_result("dam", settings=settings, levels="5.88,18.9")
     assert answer.mode == "unstable crack growth"
     assert answer.after["by relaxation"] > answer.value > 20
+
+
+def test_a_way_from_the_same_beginning_solves_no_step_again(monkeypatch):
+    """With another fall that counts as unstable growth the path is the same up to there."""
+    solved, step = [], path.Point.step
+    monkeypatch.setattr(path.Point, "step", lambda *by: solved.append(by) or step(*by))
+    search = Search(load("dam", {"law": "bond", "n_joint": 8, "order": 1}), "level")
+    first = search.path(50, search.base, 80, to_growth=True)
+    first.follow(path.SURE)
+    first.refine()
+    number = len(solved)
+    assert number > 10 and search.from_beginning(first, Way(unstable_fall=0.0011)) is None
+    assert len(solved) == number
+    search.from_beginning(first, Way(share=0.5))
+    assert len(solved) > number
 
 
 @pytest.mark.heavy

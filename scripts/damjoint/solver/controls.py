@@ -4,6 +4,7 @@ load unknown.
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -25,6 +26,11 @@ class LevelControl:
 
     level: float
 
+    @property
+    def key(self) -> Hashable:
+        """What tells it from others."""
+        return "level", self.level
+
 
 @dataclass(frozen=True)
 class DisplacementControl:
@@ -40,6 +46,11 @@ class DisplacementControl:
     def gradient(self, equilibrium: Equilibrium, jump: Array) -> Array:
         """Its derivative with the jump (j,), at a jump (j,)."""
         raise NotImplementedError
+
+    @property
+    def key(self) -> Hashable:
+        """What tells it from others of its kind, with the same unknown."""
+        return self.value
 
     def rate(self, equilibrium: Equilibrium, loading: Loading) -> float:
         """Its derivative with what is unknown in the loading."""
@@ -87,6 +98,11 @@ class DirectionControl(DisplacementControl):
     """How far the jumps move along a direction (j,): a sum of them with these weights."""
 
     direction: Array
+
+    @property
+    def key(self) -> Hashable:
+        """See `DisplacementControl`."""
+        return self.value, self.direction.tobytes()
 
     def gradient(self, equilibrium: Equilibrium, jump: Array) -> Array:
         """See `DisplacementControl`."""

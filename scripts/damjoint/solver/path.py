@@ -13,12 +13,12 @@ displacement, is a mechanism.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import takewhile
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -431,6 +431,22 @@ class Point:
         )
 
 
+#: Ends of steps (None: it has not converged) with their begins, which the identities in their keys
+#: need, by begin, time and control.
+Solved: TypeAlias = dict[tuple[int, float, str, Hashable], tuple[Point, Point | None]]
+
+
+def solve_once(
+    solved: Solved, point: Point, time: float, control: Control, imposed: float, kind: str
+) -> Point | None:
+    """`Point.step`, unless the step has been solved."""
+    key = id(point), time, kind, control.key
+    if key not in solved:
+        solved[key] = point, point.step(time, control, imposed, kind)
+    _, end = solved[key]
+    return end if end is None or end.imposed == imposed else replace(end, imposed=imposed)
+
+
 class EquilibriumPath:
     """Equilibria one after the other, each with a larger displacement than the one before."""
 
@@ -440,9 +456,12 @@ class EquilibriumPath:
     #: whether its increments are halved until their halves lead to the same state
     verified = True
 
-    def __init__(self, points: list[Point], time: float, tick: float = 0.0) -> None:
+    def __init__(
+        self, points: list[Point], time: float, tick: float = 0.0, solved: Solved | None = None
+    ) -> None:
         """points: the first ones, the last of them to continue from; time: whose loads act, but for
-        the level; tick: the time that an increment takes, for its row in the tables.
+        the level; tick: the time that an increment takes, for its row in the tables; solved: steps
+        that have been solved.
         """
         self.points, self.time, self.tick = points, time, tick
         #: whether no further equilibrium has been found
@@ -470,8 +489,8 @@ class EquilibriumPath:
         self.longest = np.inf
         #: intervals in which no increment leads to a state of the branch, by the points before them
         self.closed = list[Point]()
-        #: increments that have not converged, of this path and its copies, by point and control
-        self.failed = dict[tuple[int, str, float], Point]()
+        #: the steps of this path and its copies
+        self.solved: Solved = {} if solved is None else solved
 
     @property
     def falls(self) -> bool:
@@ -782,14 +801,8 @@ class EquilibriumPath:
         self, point: Point, control: DisplacementControl, by: float, kind: str
     ) -> Point | None:
         """The equilibrium at the value of a control, an increment [m] further than a point."""
-        key = id(point), kind, control.value
-        if key in self.failed:  # which keeps the point, and so its id
-            return None
         time = max(point.state.time, self.time) + self.tick
-        end = point.step(time, control, self.imposed(point) + abs(by), kind)
-        if end is None:
-            self.failed[key] = point
-        return end
+        return solve_once(self.solved, point, time, control, self.imposed(point) + abs(by), kind)
 
     # -- refinement of its highest level
     # ----------------------------------------------------------------------------------------------

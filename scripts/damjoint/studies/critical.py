@@ -373,6 +373,7 @@ class Search:
             to_growth=to_growth,
             rise=way.share * path.rise,
             solver=path.solver,
+            known=path if case is path.case else None,
         )
         other.unstable_fall = way.unstable_fall
         other.follow(SURE)
@@ -708,8 +709,9 @@ def run_to(path: FailurePath, level: float) -> LoadStepper:
     if levels[-1] < level:
         levels, tails = (*levels, level), (*tails, tails[-1])
     run = LoadStepper(varied(case, {}, levels, tails).with_values(solver), path.interface)
-    for _ in run.steps():
-        pass
+    for state in run.steps():
+        if run.path_ended and state.loading.level > (1 - PRECISION) * path.highest:
+            run.path_begin = state  # both paths have ended: no other one is begun from there
     return run
 
 

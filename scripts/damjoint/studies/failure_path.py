@@ -21,7 +21,7 @@ from ..model.results import HISTORY, Columns, with_all_joints
 from ..solver.controls import LevelControl
 from ..solver.history import JointState
 from ..solver.load_stepper import SAME_TIME, LoadStepper
-from ..solver.path import RISE, EquilibriumPath, Point
+from ..solver.path import RISE, EquilibriumPath, Point, Solved, solve_once
 
 #: Columns of critical.csv: a row per equilibrium of each dam that was tried. With several joints:
 #: of the first one; see `critical_columns`.
@@ -77,18 +77,22 @@ class FailurePath(EquilibriumPath):
         to_growth: bool = False,
         rise: float = RISE,
         solver: Mapping[str, float] | None = None,
+        known: FailurePath | None = None,
     ) -> None:
         """target: the level [m] to reach, the highest still to come by default; on_step: called
         with the level of each equilibrium; to_growth: whether it is followed, with a law that
         softens in tension or releases its shear, to the first unstable crack growth only; rise: of
         the level that an increment aims at, relative. With a smaller one the levels are prescribed
         up to a smaller part of a joint; solver: parameters of the solver, for a beginning by all
-        strategies of a run where single steps lead to no equilibrium.
+        strategies of a run where single steps lead to no equilibrium; known: another path of the
+        same case, whose steps are not solved again.
         """
         self.case, self.interface, self.on_step = case, interface, on_step
         self.solver = solver or {}
         self.points: list[Point] = []
-        stepper = LoadStepper(case, interface)
+        stepper = known.stepper if known else LoadStepper(case, interface)
+        #: the steps so far, see `EquilibriumPath`
+        self.solved: Solved = dict(known.solved) if known else {}
         #: whether it begins where only a run has found an equilibrium
         self.begun_by_run = False
         #: whether relaxation has reached a higher level from which no path leads on, see `fill_on`
@@ -98,7 +102,10 @@ class FailurePath(EquilibriumPath):
         #: the part of a joint that may open or soften before a displacement is prescribed
         self.most_softened = SOFTENED * rise / RISE
         #: whether the loads of a time are those of the last one, but for the level
-        self.stepper, self.same_loads = stepper, dict[float, bool]()
+        self.stepper: LoadStepper = stepper
+        self.same_loads = dict[float, bool]()
+        #: the equilibrium under the weight alone; None: not known
+        self.weighed: Point | None = None
         laws = stepper.model.equilibrium.laws
         #: whether water enters the crack element by element, at each of which the level falls
         self.entering = any(joint["uplift"] == "cracked" for joint in case.joints)
@@ -112,14 +119,18 @@ class FailurePath(EquilibriumPath):
         self.releases_shear = laws.releases_shear
         self.to_growth = to_growth and (self.releases_shear or (brittle and not self.entering))
         # after a step of the weight alone steps can be halved; else the first includes the weight
-        if case["weight_first"] and stepper.weigh():
-            self.fill(point_of(stepper))
+        if known:
+            self.weighed = known.weighed
+        elif case["weight_first"] and stepper.weigh():
+            self.weighed = point_of(stepper)
+        if self.weighed:
+            self.fill(self.weighed)
         if not self.points:
             self.begin_by_run()
         time = self.points[-1].state.time if self.points else 0.0
         ahead = [v for t, v in enumerate(case.levels, 1) if t >= time]
         self.target = max(ahead) if target is None else target
-        super().__init__(self.points, len(case.levels), TICK)
+        super().__init__(self.points, len(case.levels), TICK, self.solved)
         self.rise = rise
 
     def begin_by_run(self) -> None:
@@ -161,7 +172,8 @@ class FailurePath(EquilibriumPath):
         begin, case = point.state.time, self.case
 
         def reach(start: Point, time: float) -> Point | None:
-            return start.step(time, LevelControl(case.level_at(time)), 0.0, "level")
+            control = LevelControl(case.level_at(time))
+            return solve_once(self.solved, start, time, control, 0.0, "level")
 
         whole = reach(point, begin + length)
         for _ in range(HALVINGS):
