@@ -1,9 +1,10 @@
 """Sparse factorisations: Schur complements and systems of symmetric matrices.
 
 By MUMPS through mumps.c, which `make setup` compiles, or its first use if the system has a C
-compiler and MUMPS; else by scipy's SuperLU, which is several times slower in 3D
-(is_slow). Large matrices are eliminated in METIS's order where pymetis is installed: with a Schur
-complement, MUMPS itself orders by approximate minimum degree, which needs twice the operations.
+compiler and MUMPS; else by scipy's SuperLU, which is several times slower in 3D (is_slow), but
+faster for many right-hand sides of a small matrix. Large matrices are eliminated in METIS's order
+where pymetis is installed: with a Schur complement, MUMPS itself orders by approximate minimum
+degree, which needs twice the operations.
 """
 
 from __future__ import annotations
@@ -36,6 +37,9 @@ from .memory import available, check_memory, dense_memory
 if TYPE_CHECKING:  # loaded where it is used, as a command with cached data does not need it
     from scipy.sparse.linalg import SuperLU
 
+#: Number of eliminated times kept unknowns up to which many right-hand sides take less time by
+#: SuperLU.
+SMALL = 400_000
 #: Number of unknowns from which on METIS's order saves more time than it takes.
 LARGE = 15000
 
@@ -274,10 +278,14 @@ class SuperLUFactors:
     """The same by SuperLU: `schur`, `reduce` and `expand` of `MumpsFactors`."""
 
     def __init__(self, matrix: Sparse, keep: IntArray) -> None:
-        self.keep, self.inside = keep, np.setdiff1d(np.arange(matrix.shape[0]), keep)
+        self.keep, self.inside = keep, others(matrix.shape[0], keep)
         self.factors = superlu(matrix[self.inside][:, self.inside].tocsc(), "MMD_AT_PLUS_A")
         self.coupling = matrix[keep][:, self.inside].tocsr()
         self.schur = schur_by_superlu(matrix, keep)
+        #: what the kept unknowns move (n - k, k), of a small matrix
+        self.follow: Array | None = None
+        if is_small(matrix, keep):
+            self.follow = np.ascontiguousarray(self.factors.solve(self.coupling.T.toarray()))
 
     def reduce(self, right: Array) -> Array:
         """See `MumpsFactors`."""
@@ -287,9 +295,21 @@ class SuperLUFactors:
     def expand(self, solution: Array) -> Array:
         """See `MumpsFactors`."""
         result = np.zeros(len(self.inside) + len(self.keep))
-        result[self.inside] = self._partial - self.factors.solve(self.coupling.T @ solution)
+        moved = (
+            self.factors.solve(self.coupling.T @ solution)
+            if self.follow is None
+            else self.follow @ solution
+        )
+        result[self.inside] = self._partial - moved
         result[self.keep] = solution
         return result
+
+
+def is_small(matrix: Sparse, keep: IntArray) -> bool:
+    """Whether the eliminated unknowns of a matrix take less time by a dense product with the k kept
+    ones, and all by SuperLU, whose calls take less than those of MUMPS.
+    """
+    return (matrix.shape[0] - len(keep)) * len(keep) <= SMALL
 
 
 def unknowns_text(matrix: CsrMatrix | Sparse, keep: IntArray) -> str:
@@ -306,9 +326,9 @@ def partial_factors(matrix: Sparse, keep: IntArray) -> MumpsFactors | SuperLUFac
     what = unknowns_text(matrix, keep)
     check_memory(dense_memory(len(keep)), what)
     mumps = library()
-    return (
-        SuperLUFactors(matrix, keep) if mumps is None else MumpsFactors(mumps, matrix, keep, what)
-    )
+    if mumps is None or is_small(matrix, keep):
+        return SuperLUFactors(matrix, keep)
+    return MumpsFactors(mumps, matrix, keep, what)
 
 
 def schur_complement(matrix: CsrMatrix, keep: IntArray, loads: Array) -> tuple[Array, Array]:

@@ -58,8 +58,10 @@ class Assembly:
         return self.stiffness(tangent[points] - before[points], points)[rows], rows
 
     @cached_property
-    def operator(self) -> Sparse:
-        """Entries of the stiffness (j * j) from those of the tangents (q * dim * dim)."""
+    def operator(self) -> tuple[IntArray, Sparse]:
+        """The entries of the stiffness, among j * j, that joints have (e,), and a matrix that leads
+        to them from those of the tangents (e, q * dim * dim).
+        """
         from scipy import sparse
 
         d, size = self.dim, self.size
@@ -75,13 +77,16 @@ class Assembly:
             columns.append(np.tile(q * d * d + np.arange(d * d), entries.size))
             values.append(parts.ravel())
         data, row, column = (np.concatenate(part) for part in (values, rows, columns))
-        return sparse.csr_matrix((data, (row, column)), (size * size, self.number * d * d))
+        entries, row = np.unique(row, return_inverse=True)
+        return entries, sparse.csr_matrix(
+            (data, (row, column)), (len(entries), self.number * d * d)
+        )
 
-    def dense(self, tangent: Array) -> Array:
-        """The stiffness (j, j) of all Gauss points by one product, for few unknowns."""
-        entries = np.ascontiguousarray(tangent[:, : self.dim, : self.dim]).ravel()
-        stiffness: Array = self.operator @ entries
-        return stiffness.reshape(self.size, self.size)
+    def with_joints(self, stiffness: Array, tangent: Array) -> Array:
+        """A stiffness (j, j) with that of all Gauss points, by one product, for few unknowns."""
+        (entries, operator), matrix = self.operator, stiffness.copy()
+        matrix.ravel()[entries] += operator @ tangent[:, : self.dim, : self.dim].ravel()
+        return matrix
 
 
 def number_of_terms(at_points: CsrMatrix, dim: int) -> int:

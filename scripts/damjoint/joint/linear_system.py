@@ -96,7 +96,7 @@ class DenseSystem:
 
     def matrix(self, tangent: Tangent) -> Array:
         """S + K (j, j), by dense products, which are faster for few unknowns."""
-        matrix = self.stiffness + self.assembly.dense(tangent.law)
+        matrix = self.assembly.with_joints(self.stiffness, tangent.law)
         if flow := tangent.flow:
             matrix[:, flow.columns] -= self.lift(tangent.flowing) @ flow.pressure
         return matrix

@@ -102,7 +102,8 @@ class Friction(Law[FrictionVariables]):
 
     def opening(self, jump: Array, variables: FrictionVariables) -> Array:
         """The opening beyond what the saw has removed."""
-        return np.asarray(jump[:, 0] - self.added_thickness(variables, len(jump)))
+        opening = jump[:, 0]
+        return opening - self.added_thickness(variables, len(jump)) if self.saw else opening
 
     def added_thickness(self, variables: FrictionVariables, points: int) -> Array:
         """See `Law`: the thickness of the saw less the opening before."""

@@ -234,6 +234,8 @@ class History:
     saved: list[State] = field(default_factory=list)
     #: times of the rows whose step has converged by round-off, see `Convergence`
     by_round_off: list[float] = field(default_factory=list)
+    #: at the last state, see `joints`
+    last_joints: list[JointState] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         case = self.equilibrium.case
@@ -289,7 +291,7 @@ class History:
 
     def add(self, step: StepResult, cuts: int) -> None:
         """The row of a converged step; cuts: how often it was shortened."""
-        state, equilibrium = step.state, self.equilibrium
+        state = step.state
         row = {
             "time": state.time,
             "level": state.loading.level,
@@ -299,14 +301,20 @@ class History:
             "residual": step.residual,
             "crest_ux": self.crest(state),
         }
-        for k in range(len(equilibrium.interface.joints)):
-            of_joint = JointState(equilibrium, state, k).row
-            row |= {column_of(name, k): value for name, value in of_joint.items()}
+        for k, joint in enumerate(self.joints(state)):
+            row |= {column_of(name, k): value for name, value in joint.row.items()}
         row |= row_of_control(self, state)
         for name, values in self.rows.items():
             values.append(float(row[name]))
         if step.criterion == BY_ROUND_OFF:
             self.by_round_off.append(state.time)
+
+    def joints(self, state: State) -> list[JointState]:
+        """The joints at a state; those of the last one are kept, as its tables follow its row."""
+        if not self.last_joints or self.last_joints[0].state is not state:
+            number = len(self.equilibrium.interface.joints)
+            self.last_joints = [JointState(self.equilibrium, state, k) for k in range(number)]
+        return self.last_joints
 
     def crest(self, state: State) -> float:
         """The crest's displacement along x [m]."""
@@ -322,10 +330,7 @@ class History:
         """The joints at the state last added, node by node; and with jump and stress extrapolated
         from the Gauss points.
         """
-        parts = [
-            JointState(self.equilibrium, state, k).table()
-            for k in range(len(self.equilibrium.interface.joints))
-        ]
+        parts = [joint.table() for joint in self.joints(state)]
         self.saved.append(state)
         table, extrapolated = (np.vstack(rows) for rows in zip(*parts, strict=True))
         self.tables.append((table, extrapolated))
