@@ -26,7 +26,6 @@ from damjoint.storage import atomic_write, locked_folder
 from PIL import Image
 from processes import without_progress
 from scipy import sparse
-from variants import further
 
 BARE = ("--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4", "--no-fields")
 RUN = ("run", "c", *BARE, "--no-picture", "--levels", "6")
@@ -305,25 +304,17 @@ NESTED = "[" * 100_000 + "]" * 100_000
 @pytest.mark.heavy
 @pytest.mark.parametrize(
     "old, new",
-    further(
-        3,
-        [
-            ("{", NESTED),
-            pytest.param('"state": "complete"', f'"state": {NESTED}', marks=pytest.mark.heavy),
-            ('"wall_seconds": {', '"wall_seconds": [1], "seconds": {'),
-            pytest.param(
-                '"versions": {', '"versions": ["damjoint"], "numbers": {', marks=pytest.mark.heavy
-            ),
-            ('"title": "', '"title": "\\ud800'),
-            ('"case": "c"', '"case": ".."'),
-            ('"case": "c"', '"case": ["c"]'),
-            ('"levels": [', '"levels": [1e400, '),
-            *(
-                pytest.param('"case": "c"', f'"case": "{name}"', marks=pytest.mark.heavy)
-                for name in ("\\ud800", "c\\u0000")
-            ),
-        ],
-    ),
+    [
+        ("{", NESTED),
+        ('"state": "complete"', f'"state": {NESTED}'),
+        ('"wall_seconds": {', '"wall_seconds": [1], "seconds": {'),
+        ('"versions": {', '"versions": ["damjoint"], "numbers": {'),
+        ('"title": "', '"title": "\\ud800'),
+        ('"case": "c"', '"case": ".."'),
+        ('"case": "c"', '"case": ["c"]'),
+        ('"levels": [', '"levels": [1e400, '),
+        *(('"case": "c"', f'"case": "{name}"') for name in ("\\ud800", "c\\u0000")),
+    ],
 )
 def test_an_invalid_value_in_run_json_is_reported(command, tmp_path, old, new):
     """In one line; a new run may overwrite the folder."""
@@ -495,17 +486,14 @@ def test_a_getdp_run_that_exceeds_the_memory_is_refused(command, monkeypatch):
 @pytest.mark.heavy
 @pytest.mark.parametrize(
     "engine, streams",
-    further(
-        1,
-        [
-            ("condensed", "<&- >&- 2>&-"),
-            ("condensed", "2>&-"),
-            ("condensed", ">&-"),
-            ("getdp", "<&- >&- 2>&-"),
-            pytest.param("getdp", "2>&-", marks=pytest.mark.heavy),
-            pytest.param("getdp", ">&-", marks=pytest.mark.heavy),
-        ],
-    ),
+    [
+        ("condensed", "<&- >&- 2>&-"),
+        ("condensed", "2>&-"),
+        ("condensed", ">&-"),
+        ("getdp", "<&- >&- 2>&-"),
+        ("getdp", "2>&-"),
+        ("getdp", ">&-"),
+    ],
 )
 def test_a_run_with_closed_standard_streams(tmp_path, streams, engine):
     """As cron and services may start a command."""

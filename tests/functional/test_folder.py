@@ -20,7 +20,7 @@ BARE = (*SMALL, "--no-fields", "--no-picture")
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("engine", [pytest.param("getdp", marks=pytest.mark.heavy), "condensed"])
+@pytest.mark.parametrize("engine", ["getdp", "condensed"])
 def test_files_of_the_user_in_the_folder_stay(command, tmp_path, engine):
     """Also in work/ and fields/, beside an earlier run."""
     mine = [
@@ -44,7 +44,7 @@ def test_files_of_the_user_in_the_folder_stay(command, tmp_path, engine):
     "words",
     [
         (),
-        pytest.param(("--out", "here/there"), marks=pytest.mark.heavy),
+        ("--out", "here/there"),
         ("--out", 'it\'s "mine" é'),
     ],
 )
@@ -89,7 +89,7 @@ def test_bad_input_leaves_an_earlier_run_unchanged(command, tmp_path):
 @pytest.mark.usefixtures("no_pictures")
 @pytest.mark.parametrize(
     "newer",
-    further(1, [["check", "c", "--out", "out"], ["run", "c", "--out", "out/c"], ["run", "c"]]),
+    [["check", "c", "--out", "out"], ["run", "c", "--out", "out/c"], ["run", "c"]],
 )
 def test_the_table_of_a_check_does_not_stay_beside_a_newer_run_that_fails(
     command, tmp_path, monkeypatch, newer

@@ -18,7 +18,6 @@ from damjoint.input.casefile import read
 from damjoint.input.parameters import declared, parameter, start_gmsh
 from damjoint.input.resolve import load
 from matplotlib.image import imread
-from variants import further
 
 #: An order 1 mesh that is solved in a second
 COARSE = {"n_joint": 20.0, "h_dam": 2.0, "h_found": 4.0}
@@ -59,26 +58,23 @@ def press_run(folder, changed):
 @pytest.mark.heavy
 @pytest.mark.parametrize(
     "words, message",
-    further(
-        3,
-        [
-            ("level_2 20.5", "Level 2 = 20.5 m: must be between 0 and 20 m"),
-            ("tail_level_1 -3", "Tailwater at level 1 = -3 m: must be between 0 and 20 m"),
-            ("dam_height 4", "Level 4 = 9 m: must be between 0 and 8 m"),
-            ("batter 5", "batter = 5: must be below dam_base (5 m)"),
-            ("neck_height 10", "neck_height = 10: must be below dam_height (10 m)"),
-            (
-                "neck_height 3 -setnumber neck_batter 4",
-                "neck_batter = 4: must be at most 3.5 m (dam_base - batter - dam_crest)",
-            ),
-            ("joint_height 11", "joint_height = 11: must be below dam_height (10 m)"),
-            (
-                "joint_slope 60 -setnumber dam_base 6",
-                "joint_slope = 60: must let the joint leave the dam below its crest",
-            ),
-            ("force_x 1 -setnumber force_at 3", "anchor_at, drive_at: must lie on the dam's faces"),
-        ],
-    ),
+    [
+        ("level_2 20.5", "Level 2 = 20.5 m: must be between 0 and 20 m"),
+        ("tail_level_1 -3", "Tailwater at level 1 = -3 m: must be between 0 and 20 m"),
+        ("dam_height 4", "Level 4 = 9 m: must be between 0 and 8 m"),
+        ("batter 5", "batter = 5: must be below dam_base (5 m)"),
+        ("neck_height 10", "neck_height = 10: must be below dam_height (10 m)"),
+        (
+            "neck_height 3 -setnumber neck_batter 4",
+            "neck_batter = 4: must be at most 3.5 m (dam_base - batter - dam_crest)",
+        ),
+        ("joint_height 11", "joint_height = 11: must be below dam_height (10 m)"),
+        (
+            "joint_slope 60 -setnumber dam_base 6",
+            "joint_slope = 60: must let the joint leave the dam below its crest",
+        ),
+        ("force_x 1 -setnumber force_at 3", "anchor_at, drive_at: must lie on the dam's faces"),
+    ],
 )
 def test_impossible_sections_are_refused_before_the_run(project, words, message):
     """In Gmsh and in GetDP: one line with the level, its value and the allowed range."""
@@ -95,18 +91,15 @@ def test_impossible_sections_are_refused_before_the_run(project, words, message)
 @pytest.mark.heavy
 @pytest.mark.parametrize(
     "text, message",
-    further(
-        1,
-        [
-            ("{20, 30, 25, 20}", "its corners up to (25, 20) must rise from one to the next"),
-            ("{-2, 30}", "its corners up to (-2, 30) must rise from one to the next, downstream"),
-            ("{20, 30, 9}", "downstream_face: must be pairs x, y of corners, upwards"),
-            (
-                "{20, 30}; default_neck_height = 3",
-                "neck_height = 3: must be 0 with downstream_face",
-            ),
-        ],
-    ),
+    [
+        ("{20, 30, 25, 20}", "its corners up to (25, 20) must rise from one to the next"),
+        ("{-2, 30}", "its corners up to (-2, 30) must rise from one to the next, downstream"),
+        ("{20, 30, 9}", "downstream_face: must be pairs x, y of corners, upwards"),
+        (
+            "{20, 30}; default_neck_height = 3",
+            "neck_height = 3: must be 0 with downstream_face",
+        ),
+    ],
 )
 def test_an_impossible_downstream_face_is_refused_before_the_run(project, text, message):
     (project / "dam.case").write_text(f"downstream_face() = {text};")
@@ -312,14 +305,11 @@ def test_a_dam_that_fails_by_the_earthquake_is_red(project):
 @pytest.mark.heavy
 @pytest.mark.parametrize(
     "name, given, steps",
-    further(
-        2,
-        [
-            ("dam", "default_dt = 0.02;\n", 3),
-            ("dam", "", 12),
-            ("stepped", "default_dt = 0.02;\n", 3),
-        ],
-    ),
+    [
+        ("dam", "default_dt = 0.02;\n", 3),
+        ("dam", "", 12),
+        ("stepped", "default_dt = 0.02;\n", 3),
+    ],
 )
 def test_an_earthquake_has_the_time_step_of_its_problem(project, name, given, steps):
     """As Gmsh's tree, made by the .geo file, has none (-1): that of the .pro file with the record,

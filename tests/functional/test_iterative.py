@@ -63,7 +63,7 @@ def assert_same(one, other):
     [
         ("friction", "imposed"),
         *(
-            pytest.param(law, uplift, marks=pytest.mark.heavy)
+            (law, uplift)
             for law in WEAK
             for uplift in ("none", "imposed", "cracked", "flow")
             if (law, uplift) != ("friction", "imposed")

@@ -362,7 +362,7 @@ def test_check_and_critical_are_those_of_the_commands(command, tmp_path):
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("accuracy", [None, pytest.param("10%", marks=pytest.mark.heavy)])
+@pytest.mark.parametrize("accuracy", [None, "10%"])
 @pytest.mark.usefixtures("no_pictures")
 def test_a_sweep_is_that_of_the_command(command, tmp_path, monkeypatch, accuracy):
     """The same rows as the file, from the same distribution; with an accuracy on the same mesh."""

@@ -31,7 +31,6 @@ from matplotlib.text import Text
 from numpy.testing import assert_allclose
 from PIL import Image
 from scipy.integrate import trapezoid
-from variants import as_heavy, further
 
 COARSE = {"n_joint": 10, "h_dam": 12, "h_found": 60}
 #: Cases of different legends: silt, drains, earthquake, tailwater; overturning, softening; closed;
@@ -66,7 +65,7 @@ def figures(runs):
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("name", [as_heavy(n) if n == "overturning" else n for n in CASES])
+@pytest.mark.parametrize("name", CASES)
 def test_a_picture_fits_a_page_and_nothing_is_clipped(figures, name):
     figure = figures(name)
     width, height = figure.get_size_inches()
@@ -76,7 +75,7 @@ def test_a_picture_fits_a_page_and_nothing_is_clipped(figures, name):
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("name", [as_heavy(n) if n == "overturning" else n for n in CASES])
+@pytest.mark.parametrize("name", CASES)
 def test_nothing_is_clipped_in_half_a_page(runs, name):
     """As in a report."""
     solution = runs(name).solution
@@ -267,7 +266,7 @@ def test_a_run_loads_neither_meshio_nor_the_plotting_library(tmp_path):
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("name", further(1, ["flow", "k"]))
+@pytest.mark.parametrize("name", ["flow", "k"])
 def test_two_processes_draw_the_same_picture(painted, runs, tmp_path, name):
     solution = runs(name).solution
     pictures.draw(solution, tmp_path)

@@ -110,7 +110,7 @@ def test_commands_print_lines(command, frequent, words, pattern):
     "words",
     [
         ("run", "dam", "--no-picture"),
-        pytest.param(("critical", "dam"), marks=pytest.mark.heavy),
+        ("critical", "dam"),
     ],
 )
 def test_before_the_first_step_the_lines_say_what_takes_the_time(command, frequent, words):

@@ -118,18 +118,15 @@ def test_an_altered_column_of_a_joint_is_detected(
 @pytest.mark.heavy
 @pytest.mark.parametrize(
     "column, change, message",
-    further(
-        3,
-        [
-            ("crest_ax", lambda v: v * 1.001, "crest_ux is off"),
-            ("ground_ax", lambda v: v * 1.001, "not that of the record"),
-            ("ground_ay", lambda v: v + 1e-3, "not that of the record"),
-            ("dt", lambda v: v * 1.001, "not the sums"),
-            ("heel_opening", lambda v: v * np.nan, "not finite"),
-            ("shear_reserve", lambda v: 0 * v + np.inf, "shear_reserve of law = friction"),
-            ("time", lambda v: np.append(v[:-1], v[-1] + 0.02), "the record at"),
-        ],
-    ),
+    [
+        ("crest_ax", lambda v: v * 1.001, "crest_ux is off"),
+        ("ground_ax", lambda v: v * 1.001, "not that of the record"),
+        ("ground_ay", lambda v: v + 1e-3, "not that of the record"),
+        ("dt", lambda v: v * 1.001, "not the sums"),
+        ("heel_opening", lambda v: v * np.nan, "not finite"),
+        ("shear_reserve", lambda v: 0 * v + np.inf, "shear_reserve of law = friction"),
+        ("time", lambda v: np.append(v[:-1], v[-1] + 0.02), "the record at"),
+    ],
 )
 def test_an_altered_column_of_the_motion_is_detected(files, tmp_path, column, change, message):
     found = altered(files, tmp_path, "quake", column, change)
@@ -154,10 +151,10 @@ LIFT = {"lift_heights": (20.0,), "uplift": ("flow", "cracked")}
     "settings",
     [
         RUPTURE | {"quake_uplift": "zero"},
-        pytest.param({"uplift": "flow", "quake_uplift": "crack"}, marks=pytest.mark.heavy),
-        pytest.param(LIFT | {"quake_uplift": "zero"}, marks=pytest.mark.heavy),
-        pytest.param(LIFT | {"quake_uplift": "crack"}, marks=pytest.mark.heavy),
-        pytest.param({"uplift": "cracked", "quake_uplift": "unchanged"}, marks=pytest.mark.heavy),
+        {"uplift": "flow", "quake_uplift": "crack"},
+        LIFT | {"quake_uplift": "zero"},
+        LIFT | {"quake_uplift": "crack"},
+        {"uplift": "cracked", "quake_uplift": "unchanged"},
     ],
 )
 def test_the_water_of_every_step_follows_from_the_openings(tmp_path, settings):
@@ -250,14 +247,11 @@ def test_random_earthquakes_can_be_loaded_and_have_all_laws_and_waters(tmp_path)
 @pytest.mark.heavy
 @pytest.mark.parametrize(
     "settings",
-    further(
-        1,
-        [
-            {"hht_alpha": 0.0, "joint_damping_n": 1e8, "joint_damping_t": 5e7},
-            {"rock_mass": 1.0, "rho_found": 2600.0, "quake_uplift": "zero", "damping_mass": 1.0},
-            {"time_integration": "published", "joint_damping_n": 1e8},
-        ],
-    ),
+    [
+        {"hht_alpha": 0.0, "joint_damping_n": 1e8, "joint_damping_t": 5e7},
+        {"rock_mass": 1.0, "rho_found": 2600.0, "quake_uplift": "zero", "damping_mass": 1.0},
+        {"time_integration": "published", "joint_damping_n": 1e8},
+    ],
 )
 def test_the_equations_of_all_unknowns_and_the_balance_of_energy(tmp_path, settings):
     """Energy is conserved with alpha = 0, and otherwise lost; wrong masses are noticed."""

@@ -194,7 +194,7 @@ def test_an_impossible_section_is_refused(settings, message):
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("effectiveness", further(1, [1.0, 0.5, 0.0]))
+@pytest.mark.parametrize("effectiveness", [1.0, 0.5, 0.0])
 def test_drains_in_the_uncracked_part(solve, effectiveness):
     """As in the gravity method, on a rigid dam; there is a node at the drains."""
     drains = {"drains": 1, "drain_x": 4, "drain_effectiveness": effectiveness}
@@ -219,7 +219,7 @@ def test_drains_of_a_closed_lift_joint(solve, uplift):
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("name", ["e", pytest.param("f", marks=pytest.mark.heavy)])
+@pytest.mark.parametrize("name", ["e", "f"])
 def test_drains_where_water_flows(solve, name):
     """They take a part of the flow, the rest leaves at the toe; in 2D and 3D the same. Where
     the joint is closed: rho w^3 / (12 eta) dp/ds.

@@ -120,10 +120,7 @@ EXACT, OF_SIZE = 1e-6, 1e-8
 @pytest.mark.heavy
 @pytest.mark.parametrize(
     "uplift",
-    [
-        uplift if uplift == "imposed" else pytest.param(uplift, marks=pytest.mark.heavy)
-        for uplift in OF_UPLIFTS
-    ],
+    OF_UPLIFTS,
 )
 @pytest.mark.parametrize("law", OF_LAWS)
 def test_the_results_of_a_run_against_central_differences(law, uplift):

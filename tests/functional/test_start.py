@@ -6,7 +6,6 @@ import sys
 
 import pytest
 from damjoint.fem import factor
-from variants import further
 
 HEAVY = "gmsh", "scipy", "matplotlib", "tabulate", "tqdm"
 PROGRAM = f"""
@@ -31,7 +30,7 @@ def loaded(cache, *words):
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("case", further(1, ["c", "g"]))
+@pytest.mark.parametrize("case", ["c", "g"])
 def test_a_run_loads_gmsh_without_a_cache_and_numpy_alone_with_it(tmp_path, case):
     words = "run", case, "--no-fields", "--no-picture", "--out", str(tmp_path / "out")
     without = loaded(tmp_path / "cache", *words)

@@ -290,11 +290,11 @@ SAMPLE = "--sample", "3", "mu=uniform(0.3,0.2)"
     "words, drawn",
     [
         (("--vary", "mu=0.4,0.5"), True),
-        pytest.param(("--vary", "mu=0.4,0.5", *OF_UPLIFT), True, marks=pytest.mark.heavy),
+        (("--vary", "mu=0.4,0.5", *OF_UPLIFT), True),
         (("--vary", "mu=0.4,0.5", *OF_LEVEL), True),
         (OF_UPLIFT, True),
         (("--vary", "mu=0.4,0.5", "--critical", "level"), True),
-        pytest.param((*OF_LEVEL, *SAMPLE), True, marks=pytest.mark.heavy),
+        ((*OF_LEVEL, *SAMPLE), True),
         ((*SAMPLE, "adhesion=uniform(0,1e3)"), True),
         (("--vary", "mu=0.4", "--vary", "level=9", "--vary", "adhesion=1,2"), False),
     ],

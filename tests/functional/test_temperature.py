@@ -33,7 +33,7 @@ WARM = {"temperature_dam": -8.0, "temperature_linear": 15.0, "temperature_found"
         ("condensed", False),
         ("condensed", True),
         ("getdp", False),
-        pytest.param("getdp", True, marks=pytest.mark.heavy),
+        ("getdp", True),
     ],
 )
 def test_a_free_wall_expands_and_bends_without_stress(engine, solid):

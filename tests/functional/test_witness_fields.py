@@ -275,15 +275,10 @@ def test_other_values_of_the_water_are_noticed(written, change):
     "uplift, level, tail",
     [
         ("flow", 12, 3),
-        *(
-            pytest.param(*scene, marks=pytest.mark.heavy)
-            for scene in [
-                ("flow", 8, 3),
-                ("flow,flow,none", 8, 3),
-                ("cracked,flow,cracked", 12, 0),
-                ("imposed", 8, 12),
-            ]
-        ),
+        ("flow", 8, 3),
+        ("flow,flow,none", 8, 3),
+        ("cracked,flow,cracked", 12, 0),
+        ("imposed", 8, 12),
     ],
 )
 def test_water_where_joints_meet_in_3d(tmp_path, uplift, level, tail):

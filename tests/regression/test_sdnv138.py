@@ -98,7 +98,7 @@ def with_eight_functions(bodies):
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("name", ["B", "C", pytest.param("D", marks=pytest.mark.heavy)])
+@pytest.mark.parametrize("name", ["B", "C", "D"])
 def test_by_the_published_conventions(name):
     """All digits, with those conventions, too, that are not options of a case; by the options
     alone: test_published.py.

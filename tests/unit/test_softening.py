@@ -56,7 +56,7 @@ def test_pure_opening_is_czm_exp_reg(law_name):
 
 @pytest.mark.heavy
 @pytest.mark.parametrize("curve", CURVES)
-@pytest.mark.parametrize("law_name", further(1, ["bond", "rupture"]))
+@pytest.mark.parametrize("law_name", ["bond", "rupture"])
 def test_opening_has_the_strength_the_curve_and_the_energy(law_name, curve):
     xi = np.r_[np.linspace(0, 1, 2001), np.linspace(1, FAR, 4001)[1:]]
     opening = np.r_[0, D_E + xi * (D_C - D_E)]
@@ -84,7 +84,7 @@ def test_sliding_has_the_strength_the_curve_and_the_energy(curve, pressure):
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("curve", further(1, CURVES))
+@pytest.mark.parametrize("curve", CURVES)
 def test_both_modes_together_dissipate_both_energies(curve):
     """Where opening and slip do the same damage; where one of them does less, its strength is lost
     with the other's, after less slip: the work is G_f and G_t times the integral of what is left.
