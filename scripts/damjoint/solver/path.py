@@ -854,7 +854,7 @@ class EquilibriumPath:
         if max(ends) - min(ends) <= precision * max(ends):
             return False
         known = [*ends, *self.interval]
-        self.interval = float(np.nanmin(known)), float(np.nanmax(known))
+        self.interval = float(np.fmin.reduce(known)), float(np.fmax.reduce(known))
         return True
 
     def by_shorter(self: P) -> P:
