@@ -181,7 +181,7 @@ def draw_shapes(picture: Figure, result: QuakeResult) -> None:
     height = picture.get_size_inches()[1]
     for i, (name, time, moved) in enumerate(result.shapes):
         width = 0.94 / len(result.shapes)
-        box = (0.03 + i * width, 0.1 / height, 0.96 * width, (SHAPES - 0.5) / height)
+        box = (0.03 + i * width, 0.45 / height, 0.96 * width, (SHAPES - 0.5) / height)
         axes = picture.add_axes(box)
         scale = exaggeration(moved, result.case.size)
         for body, displacement in moved.items():
@@ -200,4 +200,6 @@ def draw_shapes(picture: Figure, result: QuakeResult) -> None:
         axes.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room / 2, high[1] + room / 2))
         axes.set_aspect("equal")
         axes.set_axis_off()
-        axes.set_title(f"{name}, t = {time:.3f} s\nx {scale:g}", fontsize=8)
+        # below: a report cuts the picture in the white above a panel, and its title stays with it
+        text = f"{name}, t = {time:.3f} s\nx {scale:g}"
+        axes.set_title(text, fontsize=8, y=0, va="top", pad=-2)
