@@ -74,6 +74,8 @@ class LoadStepper:
         self.end_of_solution = ""
         #: whether an equilibrium path has been followed to its end
         self.path_ended = False
+        #: whether its increments that are as predicted need no halves, see `EquilibriumPath`
+        self.predicts = False
         #: the state from which the last one was followed
         self.path_begin: State | None = None
         #: how the dam fails, once its equilibrium path has shown that it does
@@ -445,7 +447,7 @@ class LoadStepper:
             return None
         self.path_begin = begin
         origin = start = Point(self.model, begin, self.history.copy())
-        path = EquilibriumPath([start], time)
+        path = self.path_from(start, time)
         same = self.same_but_for_level(self.model.loading(time, level), begin.loading)
         if same:
             path.advance()
@@ -460,7 +462,7 @@ class LoadStepper:
             fails = path.slides or path.settled(ROUGH if path.ended else SURE)
             first = again and same and origin is start
             if (fails or path.ended) and first and (earlier := self.before_limit_point(path)):
-                origin, path = earlier, EquilibriumPath([earlier], time)
+                origin, path = earlier, self.path_from(earlier, time)
                 continue
             if fails or path.ended:
                 break
@@ -483,6 +485,12 @@ class LoadStepper:
             self.rewind(origin)
             self.record_limit_points([point.level for point in path.points])
         return step
+
+    def path_from(self, origin: Point, time: float) -> EquilibriumPath:
+        """The equilibrium path from a state, under the loads of a time."""
+        path = EquilibriumPath([origin], time)
+        path.predicts = self.predicts
+        return path
 
     def to_level_on(
         self, path: EquilibriumPath, origin: Point, level: float, time: float

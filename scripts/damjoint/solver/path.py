@@ -455,6 +455,8 @@ class EquilibriumPath:
     to_growth = False
     #: whether its increments are halved until their halves lead to the same state
     verified = True
+    #: whether those that continue the one before, as predicted, need no halves
+    predicts = False
 
     def __init__(
         self, points: list[Point], time: float, tick: float = 0.0, solved: Solved | None = None
@@ -779,7 +781,9 @@ class EquilibriumPath:
         """How far an increment is off the one before, over what is allowed if it is to need no
         halves; inf if it needs them.
         """
-        return np.inf
+        if not self.predicts or (self.to_growth and end.leaps(begin)) or end.unloads(begin):
+            return np.inf
+        return begin.prediction_error(end, max(self.highest, begin.level, end.level))
 
     def agree(self, begin: Point, whole: Point, middle: Point, end: Point) -> bool:
         """Whether one step and two halves lead to the same state; up to unstable growth, also

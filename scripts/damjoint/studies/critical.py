@@ -709,6 +709,7 @@ def run_to(path: FailurePath, level: float) -> LoadStepper:
     if levels[-1] < level:
         levels, tails = (*levels, level), (*tails, tails[-1])
     run = LoadStepper(varied(case, {}, levels, tails).with_values(solver), path.interface)
+    run.predicts = path.predicts
     for state in run.steps():
         if run.path_ended and state.loading.level > (1 - PRECISION) * path.highest:
             run.path_begin = state  # both paths have ended: no other one is begun from there

@@ -68,6 +68,8 @@ def row(point: Point) -> dict[str, float]:
 class FailurePath(EquilibriumPath):
     """The equilibria of a case, up to a target level or to failure."""
 
+    predicts = True
+
     def __init__(
         self,
         case: Case,
@@ -190,12 +192,6 @@ class FailurePath(EquilibriumPath):
         if not self.on_path(begin):
             return not whole.differs(end, begin)
         return super().agree(begin, whole, middle, end)
-
-    def predictor_error(self, begin: Point, end: Point) -> float:
-        """See `EquilibriumPath.predictor_error`."""
-        if (self.to_growth and end.leaps(begin)) or end.unloads(begin):
-            return np.inf
-        return begin.prediction_error(end, max(self.highest, begin.level, end.level))
 
     def add(self, point: Point) -> None:
         """Append an equilibrium, if the toe is not crushed before it."""
