@@ -114,7 +114,9 @@ class TimeStep:
         self.mass, self.of_bodies, self.damping = map(rock.reduce, matrices) if rock else matrices
         self.jumps = np.searchsorted(problem.retained, system.jumps)
         matrix = acceleration * self.mass + weight * (self.of_bodies + self.rate * self.damping)
-        self.factors = partial_factors(matrix.tocsr(), self.jumps)
+        # with the published dashpots the matrix is another one in each step
+        many = scheme.weighted or not problem.dashpots.any()
+        self.factors = partial_factors(matrix.tocsr(), self.jumps, many)
         #: S (j, j)
         self.stiffness = self.factors.schur / weight
         self.equilibrium = problem.model.equilibrium

@@ -277,15 +277,19 @@ class MumpsFactors:
 class SuperLUFactors:
     """The same by SuperLU: `schur`, `reduce` and `expand` of `MumpsFactors`."""
 
-    def __init__(self, matrix: Sparse, keep: IntArray) -> None:
+    def __init__(self, matrix: Sparse, keep: IntArray, dense: bool = False) -> None:
+        """dense: whether to store what the kept unknowns move, for more right-hand sides."""
         self.keep, self.inside = keep, others(matrix.shape[0], keep)
         self.factors = superlu(matrix[self.inside][:, self.inside].tocsc(), "MMD_AT_PLUS_A")
         self.coupling = matrix[keep][:, self.inside].tocsr()
-        self.schur = schur_by_superlu(matrix, keep)
-        #: what the kept unknowns move (n - k, k), of a small matrix
+        #: what the kept unknowns move (n - k, k)
         self.follow: Array | None = None
-        if is_small(matrix, keep):
+        if dense:
             self.follow = np.ascontiguousarray(self.factors.solve(self.coupling.T.toarray()))
+            schur = matrix[keep][:, keep].toarray() - self.coupling @ self.follow
+            self.schur = (schur + schur.T) / 2
+        else:
+            self.schur = schur_by_superlu(matrix, keep)
 
     def reduce(self, right: Array) -> Array:
         """See `MumpsFactors`."""
@@ -305,29 +309,27 @@ class SuperLUFactors:
         return result
 
 
-def is_small(matrix: Sparse, keep: IntArray) -> bool:
-    """Whether the eliminated unknowns of a matrix take less time by a dense product with the k kept
-    ones, and all by SuperLU, whose calls take less than those of MUMPS.
-    """
-    return (matrix.shape[0] - len(keep)) * len(keep) <= SMALL
-
-
 def unknowns_text(matrix: CsrMatrix | Sparse, keep: IntArray) -> str:
     """The unknowns of a matrix, for messages on memory."""
     return f"{matrix.shape[0]} unknowns, {len(keep)} of them on the joint and the wet faces,"
 
 
-def partial_factors(matrix: Sparse, keep: IntArray) -> MumpsFactors | SuperLUFactors:
+def partial_factors(
+    matrix: Sparse, keep: IntArray, thousands: bool = False
+) -> MumpsFactors | SuperLUFactors:
     """Factors of a symmetric matrix for many right-hand sides, one after the other, with the
-    unknowns `keep` not eliminated; the rest must be positive definite.
+    unknowns `keep` not eliminated; the rest must be positive definite. For thousands of them, the
+    eliminated unknowns of a small matrix take less time by SuperLU, whose calls take less than
+    those of MUMPS, and a dense product with those kept; the factors take longer.
 
     Raises RunError if the estimated memory is not available, MemoryError if an allocation fails.
     """
     what = unknowns_text(matrix, keep)
     check_memory(dense_memory(len(keep)), what)
     mumps = library()
-    if mumps is None or is_small(matrix, keep):
-        return SuperLUFactors(matrix, keep)
+    small = (matrix.shape[0] - len(keep)) * len(keep) <= SMALL
+    if mumps is None or (thousands and small):
+        return SuperLUFactors(matrix, keep, thousands and small)
     return MumpsFactors(mumps, matrix, keep, what)
 
 
