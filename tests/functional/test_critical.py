@@ -23,11 +23,12 @@ from damjoint import RunError, runner
 from damjoint.input.resolve import load, varied
 from damjoint.joint.interface import interface_of
 from damjoint.solver import path
+from damjoint.solver.load_stepper import LoadStepper
 from damjoint.solver.path import PRECISION
 from damjoint.statics import gravity
 from damjoint.statics.verdict import highest_by_statics, verdict
 from damjoint.studies import critical_value, failure_path
-from damjoint.studies.critical import Search
+from damjoint.studies.critical import QUICK, Search, run_to
 from damjoint.studies.critical_study import critical, printed_lines, table
 from damjoint.studies.critical_ways import SHORTER, Way
 from damjoint.studies.failure_path import FailurePath
@@ -786,6 +787,25 @@ def test_the_last_point_of_a_brittle_joint_breaks_after_the_highest_level():
     else:  # its cohesion is lost point by point, which the increments all the way decide
         low, high = (float(number) for number in re.findall(r"\d+\.\d+", other.doubt)[:2])
         assert low < one.value < high
+
+
+def test_a_run_within_a_search_has_the_iterations_of_a_run(monkeypatch):
+    """Not the few of a step of the level, after which a displacement is prescribed: for want of
+    iterations a run to 119 m found no equilibrium at its first level (random dam 82-40).
+    """
+    settings, runs = {"n_joint": 8.0, "order": 1.0}, []
+    search = Search(load("dam", settings), "level")
+    along = search.path(45.0, search.base)
+    steps_to = LoadStepper.steps_to
+    watched = lambda self, target: runs.append(self.case) or steps_to(self, target)
+    monkeypatch.setattr(LoadStepper, "steps_to", watched)
+    run_to(along, 46.0)
+    along.begin_by_run()
+    expected = load("dam", settings)
+    assert len(runs) > 1
+    for case in runs:
+        assert all(case[name] == expected[name] for name in QUICK)
+        assert case.shared["strategy_iterations"] == expected.shared["strategy_iterations"]
 
 
 @pytest.mark.heavy

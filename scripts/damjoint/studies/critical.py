@@ -708,7 +708,7 @@ def run_to(path: FailurePath, level: float) -> LoadStepper:
     levels, tails = tuple(min(known, level) for known in case.levels), case.tail_levels
     if levels[-1] < level:
         levels, tails = (*levels, level), (*tails, tails[-1])
-    run = LoadStepper(varied(case, {}, levels, tails).with_values(solver), path.interface)
+    run = LoadStepper(varied(case, solver, levels, tails), path.interface)
     run.predicts = path.predicts
     for state in run.steps():
         if run.path_ended and state.loading.level > (1 - PRECISION) * path.highest:

@@ -8,12 +8,13 @@ refined to the precision.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..arrays import Array
 from ..input.case import Case
+from ..input.resolve import varied
 from ..input.values import has_drains
 from ..joint.interface import Interface
 from ..model.loads import Loading
@@ -138,7 +139,8 @@ class FailurePath(EquilibriumPath):
     def begin_by_run(self) -> None:
         """Begin with the equilibria at the first time that a run reaches, by all its strategies."""
         self.begun_by_run = True
-        model, case = self.stepper.model, self.case.with_values(self.solver)
+        model, all_steps = self.stepper.model, self.case.all_steps
+        case = replace(varied(self.case, self.solver), all_steps=all_steps)
         run = LoadStepper(case, self.interface)
         run.on_step = lambda _: self.add(Point(model, run.state, run.history.copy()))
         run.advance_to(case.times[0])
