@@ -664,6 +664,9 @@ class Search:
             comes_near = run.state.loading.level > (1 - ABOVE) * path.highest
             near_drains = path.loses_drains and not comes_near
             return replace(result, why="", doubt=end_at_drains(path)) if near_drains else result
+        if self.of == "level" and self.levels_after:  # up to where it stands
+            run = run_to(path, path.target)
+            level = max(run.history.rows["level"])
         beyond = stands_beyond(result.why, level)
         known = path.interval[1] > level  # from a path by other increments
         result = replace(result, why="", doubt=by_increments(path) if known else beyond)
