@@ -6,10 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from damjoint.input.resolve import load
-from damjoint.joint.interface import interface_of
 from damjoint.laws import LAWS
-from damjoint.solver.load_stepper import LoadStepper
-from damjoint.solver.model import Model
 from damjoint.statics.hints import hints
 from damjoint.statics.verdict import verdict
 from damjoint_witness.files import Files
@@ -65,23 +62,6 @@ def test_a_relaxation_that_converges_slowly_is_ended_by_newtons_method(solve):
     more = {"pena_rupture": 83.2, "uplift": "cracked", "weight_first": 0, "tail_levels": "0.596"}
     (result,) = solve("ssnp142", "6.41,8.13", **dam, **law, **mesh, **more)
     assert verdict(result) == "overturning" and result.last["level"] > 7.4
-
-
-@pytest.mark.heavy
-def test_newtons_method_is_not_tried_from_a_relaxed_state_far_from_equilibrium(monkeypatch):
-    """Each of six levels ends in a relaxed state, whose residual by the law from the last state is
-    2 to 280 times that of the last state: 18 solutions from there failed.
-    """
-    tried, advance = [], Model.advance
-
-    def counted(model, state, time, control, options=None):
-        tried.append(options is not None and options.guess is not None)
-        return advance(model, state, time, control, options)
-
-    monkeypatch.setattr(Model, "advance", counted)
-    case = load("e", {"E_dam": 21e9, "n_joint": 40})
-    result = LoadStepper(case, interface_of(case)).run()
-    assert len(result.info["unstable_growth"]) == 6 and not any(tried)
 
 
 @pytest.mark.parametrize("law", LAWS)

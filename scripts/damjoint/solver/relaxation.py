@@ -74,21 +74,11 @@ def over_unstable_growth(
     """A step over unstable crack growth, and whether it is the relaxed state: by Newton's method
     from that state, by the law from the last one; where it does not converge and `accept_relaxed`,
     the relaxed state itself, if the law is in equilibrium there.
-
-    Where it may be taken itself, Newton's method is not tried from a relaxed state that is no
-    nearer to equilibrium, by the law from the last state, than the last state is, from which it has
-    failed: the crack has grown far.
     """
     end = relax(model, begin, time, control)
     if end is None:
         return None, False
     relaxed, balanced = end
-    if accept_relaxed and balanced and isinstance(control, LevelControl):
-        problem, loading = model.begin(begin, time).problem, model.loading(time, control.level)
-        jumps = relaxed.state.jump, begin.jump
-        size, before = (np.linalg.norm(problem.residual(jump, loading).value) for jump in jumps)
-        if size >= before:
-            return relaxed, True
     first, *others = model.strategies
     strategies = [first, *(strategy for strategy in others if strategy.release)]
     guess = relaxed.state.jump, relaxed.state.loading.level
