@@ -97,7 +97,7 @@ class FailurePath(EquilibriumPath):
         #: the steps so far, see `EquilibriumPath`
         self.solved: Solved = dict(known.solved) if known else {}
         #: whether it begins where only a run has found an equilibrium
-        self.begun_by_run = False
+        self.begun_by_run = self.weight_with_water = False
         #: whether relaxation has reached a higher level from which no path leads on, see `fill_on`
         self.leads_higher = False
         #: the equilibria from which the path has been continued so
@@ -144,6 +144,7 @@ class FailurePath(EquilibriumPath):
         run = LoadStepper(case, self.interface)
         run.on_step = lambda _: self.add(Point(model, run.state, run.history.copy()))
         run.advance_to(case.times[0])
+        self.weight_with_water = run.weight_with_water
         if not run.stopped:
             self.fill(self.points[-1])
 
@@ -223,7 +224,7 @@ class FailurePath(EquilibriumPath):
         with a history then depends on the first level.
         """
         history = self.stepper.model.equilibrium.path_dependent
-        return self.begun_by_run and bool(self.case["weight_first"]) and history
+        return self.weight_with_water and history
 
     @property
     def loses_drains(self) -> bool:
