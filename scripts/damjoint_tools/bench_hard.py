@@ -36,7 +36,7 @@ NAMED: dict[str, tuple[str, dict[str, Any]]] = {
 #: Seed and number of the random dams of which the slowest in 2D are listed, and how many are.
 SEED, RANDOM, SLOWEST = 1, 200, 10
 #: The same of the short benchmark.
-FEW = 8
+FEW = 4
 
 
 class Clock:

@@ -659,7 +659,7 @@ def test_water_that_enters_at_once_is_unstable_growth():
     rigid = {"E": 3.59e9, "nu": 0.29, "found_side": 43.4, "found_depth": 43.4}
     settings = dam | joint | water | drains | rigid | {"weight_first": 0.0}
     settings["mesh_pattern"] = "regular"
-    starts = "13.02", "13.02,29.1", "13.02,43.7"
+    starts = "13.02,29.1", "13.02,43.7"
     answers = [search_result("dam", settings=settings, levels=levels)[1] for levels in starts]
     values = [answer.value for answer in answers]
     assert max(values) / min(values) - 1 < path.PRECISION
@@ -855,11 +855,11 @@ def test_the_level_of_a_dam_that_its_weight_breaks_does_not_depend_on_the_first_
     """For want of iterations the weight had no equilibrium: with water of 65 m it broke nothing,
     and 71.5 m was found, with 39 m 57 m.
     """
-    answers = [
-        Search(load("dam", BROKEN_BY_WEIGHT, level, "0"), "level").run() for level in ("65", "39")
-    ]
-    assert all(answer.confirmed for answer in answers)
-    assert answers[0].value == pytest.approx(answers[1].value, rel=PRECISION)
+    answer = Search(load("dam", BROKEN_BY_WEIGHT, "65", "0"), "level").run()
+    run = LoadStepper(load("dam", BROKEN_BY_WEIGHT, "39,65", "0,0", steps=16))
+    run.run()
+    assert answer.confirmed and run.stopped
+    assert max(run.history.rows["level"]) == pytest.approx(answer.value, rel=PRECISION)
 
 
 def test_it_is_said_what_a_highest_level_depends_on():
