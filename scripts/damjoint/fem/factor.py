@@ -315,21 +315,21 @@ def unknowns_text(matrix: CsrMatrix | Sparse, keep: IntArray) -> str:
 
 
 def partial_factors(
-    matrix: Sparse, keep: IntArray, thousands: bool = False
+    matrix: Sparse, keep: IntArray, many: bool = False
 ) -> MumpsFactors | SuperLUFactors:
     """Factors of a symmetric matrix for many right-hand sides, one after the other, with the
-    unknowns `keep` not eliminated; the rest must be positive definite. For thousands of them, the
-    eliminated unknowns of a small matrix take less time by SuperLU, whose calls take less than
-    those of MUMPS, and a dense product with those kept; the factors take longer.
+    unknowns `keep` not eliminated; the rest must be positive definite. many: thousands of them, for
+    which the eliminated unknowns of a small matrix take less time by SuperLU, whose calls take less
+    than those of MUMPS, and a dense product with those kept; the factors take longer.
 
     Raises RunError if the estimated memory is not available, MemoryError if an allocation fails.
     """
     what = unknowns_text(matrix, keep)
     check_memory(dense_memory(len(keep)), what)
     mumps = library()
-    small = (matrix.shape[0] - len(keep)) * len(keep) <= SMALL
-    if mumps is None or (thousands and small):
-        return SuperLUFactors(matrix, keep, thousands and small)
+    dense = many and (matrix.shape[0] - len(keep)) * len(keep) <= SMALL
+    if mumps is None or dense:
+        return SuperLUFactors(matrix, keep, dense)
     return MumpsFactors(mumps, matrix, keep, what)
 
 
@@ -397,7 +397,7 @@ def schur_by_superlu(matrix: Sparse, keep: IntArray) -> Array:
     """
     from scipy import sparse
 
-    inside = np.setdiff1d(np.arange(matrix.shape[0]), keep)
+    inside = others(matrix.shape[0], keep)
     order = np.empty_like(inside)
     order[superlu(matrix[inside][:, inside].tocsc(), "MMD_AT_PLUS_A").perm_c] = inside
     diagonal = matrix.diagonal()

@@ -28,8 +28,8 @@ class LevelControl:
 
     @property
     def key(self) -> Hashable:
-        """What tells it from others."""
-        return "level", self.level
+        """What tells it from others of its kind."""
+        return self.level
 
 
 @dataclass(frozen=True)

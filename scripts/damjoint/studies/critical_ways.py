@@ -10,11 +10,6 @@ from ..solver.path import FALL
 from .critical_value import CriticalValue
 from .failure_path import FailurePath
 
-#: Relative length of the increments of the path that is compared with one on which a branch has
-#: ended.
-SHORTER_RISE = 0.5
-#: The same, longer.
-LONGER_RISE = 1.5
 #: First level of the path that begins lower, over that of the case [-].
 LOWER_BEGIN = 0.6
 #: The level up to which the levels are prescribed to pass over a growth, over that of the growth.
@@ -38,7 +33,7 @@ class Way:
 
 
 #: By shorter and by longer increments.
-SHORTER, LONGER = Way(SHORTER_RISE), Way(LONGER_RISE)
+SHORTER, LONGER = Way(share=0.5), Way(share=1.5)
 
 
 def repeats_whole(path: FailurePath) -> bool:
