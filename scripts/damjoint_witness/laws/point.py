@@ -51,6 +51,10 @@ class Point:
         """Size of the strength [Pa] at an effective normal stress: the scale of errors."""
         raise NotImplementedError
 
+    def shear_rounding(self, jump: Jump) -> float:
+        """What the rounding of the opening changes in the shear stress [Pa]."""
+        return 0.0
+
     def jumping(self, jump: Jump) -> float:
         """Distance in opening [m] to where the damage has a discontinuity."""
         return float("inf")

@@ -8,6 +8,8 @@ from .point import Jump, Point, Values, damage_after, ramp
 
 #: Regularisation length of the shear release, over the height of the dam.
 RELEASE = 1e-13
+#: Rounding of an opening over the lengths of which it is the difference.
+ROUNDING = 1e-15
 
 
 class Rupture(Point):
@@ -106,6 +108,14 @@ class Rupture(Point):
     def further(self) -> dict[str, float]:
         """See `Point`."""
         return {"joint_thickness": self.thickness()}
+
+    def shear_rounding(self, jump: Jump) -> float:
+        """See `Point`: within the release of the shear, which may be shorter than 1e-11 m."""
+        rounding = ROUNDING * (abs(jump[0]) + self.grout + self.sawn)
+        if not -rounding < self.opening(jump) < self.L_CT + rounding:
+            return 0.0
+        slip = hypot(jump[1] - self.released[0], jump[2] - self.released[1])
+        return self.K_T * slip * rounding / self.L_CT
 
     def strength(self, normal: float) -> float:
         """See `Point`: contact and elastic shear have no bound."""
