@@ -166,7 +166,7 @@ def varied(
 ) -> Case:
     """The case with other values of any parameters, "base.mu" also where the case has a list, and
     with another loading or accuracy where they are not None; arguments as in `load`. The parameters
-    that follow others follow them; name and record stay.
+    that follow others follow them; name, record and `all_steps` stay.
 
     Raises InputError.
     """
@@ -183,8 +183,8 @@ def varied(
             value, entries = settings.pop(name), zip(case.joint_names, listed, strict=True)
             settings[of_joint] = tuple(value if n == joint else v for n, v in entries)
     result = resolve(replace(case.source.with_overrides(settings), **changes))
-    files = case.record, case.record_vertical
-    return replace(result, name=case.name, record=files[0], record_vertical=files[1])
+    kept = ("name", "record", "record_vertical", "all_steps")
+    return replace(result, **{name: getattr(case, name) for name in kept})
 
 
 def check_loading(case: Case, tails: Sequence[float], of_case: bool) -> None:

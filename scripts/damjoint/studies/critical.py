@@ -107,8 +107,6 @@ class Search:
         #: partial factors of the case; they are part of the reduced strength, not of a check
         self.partial = {name: case[factor] for name, factor in PARTIAL.items()}
         full = dict.fromkeys(PARTIAL.values(), 1.0)
-        #: whether the updates are recorded that lead to each equilibrium
-        self.all_steps = case.all_steps
         self.settings: dict[str, Setting] = {
             **QUICK,
             **case.source.overrides,
@@ -191,10 +189,10 @@ class Search:
         single = {n: v for n, v in overrides if n in alone and not isinstance(v, tuple)}
         rest = {n: v for n, v in overrides if n not in single}
         try:
-            case = resolve(replace(source, overrides=rest))
-            return case.changed(single)
+            case = resolve(replace(source, overrides=rest)).changed(single)
         except InputError:  # the others are not allowed without these
-            return resolve(source)
+            case = resolve(source)
+        return replace(case, all_steps=self.case.all_steps)
 
     def case_at(self, value: float) -> Case:
         """The case with a value.
@@ -239,7 +237,6 @@ class Search:
         highest = max(target or 0, *case.levels)  # water may press on the crest
         interface = interface_of(replace(case, levels=(*case.levels[:-1], highest)))
         solver = {name: self.case[name] for name in QUICK}
-        case = replace(case, all_steps=self.all_steps)
         path = FailurePath(case, interface, target, report, to_growth, self.rise, solver)
         self.trials.append(Trial(value, path))
         path.follow(self.factor)
@@ -665,8 +662,7 @@ class Search:
             near_drains = path.loses_drains and not comes_near
             return replace(result, why="", doubt=end_at_drains(path)) if near_drains else result
         if self.of == "level" and self.levels_after:  # up to where it stands
-            run = run_to(path, path.target)
-            level = max(run.history.rows["level"])
+            level = max(run_to(path, path.target, run).history.rows["level"])
         beyond = stands_beyond(result.why, level)
         known = path.interval[1] > level  # from a path by other increments
         result = replace(result, why="", doubt=by_increments(path) if known else beyond)
@@ -705,13 +701,16 @@ def finished(path: FailurePath) -> tuple[FailurePath, bool]:
     return path, grows
 
 
-def run_to(path: FailurePath, level: float) -> LoadStepper:
-    """A run from the beginning of a path to a level [m], by all strategies of a run."""
-    case, solver = path.case, path.solver
+def run_to(path: FailurePath, level: float, before: LoadStepper | None = None) -> LoadStepper:
+    """A run from the beginning of a path to a level [m], by all strategies of a run, or the one
+    before to a lower level, continued.
+    """
+    case, solver = before.case if before else path.case, path.solver
     levels, tails = tuple(min(known, level) for known in case.levels), case.tail_levels
     if levels[-1] < level:
         levels, tails = (*levels, level), (*tails, tails[-1])
-    run = LoadStepper(varied(case, solver, levels, tails), path.interface)
+    case = varied(case, solver, levels, tails)
+    run = before.fork(case) if before else LoadStepper(case, path.interface)
     run.predicts = path.predicts
     for state in run.steps():
         if run.path_ended and state.loading.level > (1 - PRECISION) * path.highest:

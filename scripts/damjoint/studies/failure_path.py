@@ -8,7 +8,7 @@ refined to the precision.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -140,11 +140,9 @@ class FailurePath(EquilibriumPath):
     def begin_by_run(self) -> None:
         """Begin with the equilibria at the first time that a run reaches, by all its strategies."""
         self.begun_by_run = True
-        model, all_steps = self.stepper.model, self.case.all_steps
-        case = replace(varied(self.case, self.solver), all_steps=all_steps)
-        run = LoadStepper(case, self.interface)
+        model, run = self.stepper.model, LoadStepper(varied(self.case, self.solver), self.interface)
         run.on_step = lambda _: self.add(Point(model, run.state, run.history.copy()))
-        run.advance_to(case.times[0])
+        run.advance_to(run.case.times[0])
         self.weight_with_water = run.weight_with_water
         if not run.stopped:
             self.fill(self.points[-1])
