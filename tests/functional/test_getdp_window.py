@@ -204,7 +204,8 @@ def test_every_case_runs_in_gmsh(project, name):
     if name == "valley_blocks":  # 15 joints: in one step of few iterations
         levels, words = "20", {"n_levels": 1, "level_1": 20}
     elif name == "d_file":  # in one step
-        levels, words = "7.9", {"n_levels": 1, "level_1": 7.9, "n_steps": 1}
+        values, levels = {"n_joint": 6.0}, "7.9"
+        words = {"n_levels": 1, "level_1": 7.9, "n_steps": 1}
     elif name == "ssnp166":  # to the beginning of the softening
         values = values | {"drive_by": -0.15e-3}
     case = load(name, values, levels)
