@@ -20,9 +20,6 @@ if TYPE_CHECKING:
 
 #: Number of entries up to which numpy takes less time than scipy.
 LARGE = 100_000
-#: Number of rows times columns up to which a product with a vector takes less time as that of a
-#: dense matrix.
-SMALL = 20_000
 #: The same where scipy would have to be loaded first, which takes 0.1 s.
 LARGER = 1_000_000
 
@@ -117,7 +114,7 @@ class CsrMatrix:
         """The product with an array (n,) or (n, k), or with a matrix (n, k)."""
         if isinstance(other, CsrMatrix):
             return self._times(other)
-        if self.shape[0] * self.shape[1] <= (LARGE if other.ndim == 2 else SMALL):
+        if other.ndim == 2 and self.shape[0] * self.shape[1] <= LARGE:
             return np.asarray(self.dense @ other)
         if other.ndim == 2 or is_large(len(self.data)):
             return np.asarray(self.scipy() @ other)

@@ -114,7 +114,7 @@ class Friction(Law[FrictionVariables]):
         opening = self.opening(jump, variables)
         normal = self.K_N * np.minimum(opening, self.cap_opening)
         shear = self.K_T * (jump[:, 1:] - variables.plastic)
-        size = np.hypot(shear[:, 0], shear[:, 1])
+        size = np.sqrt(shear[:, 0] ** 2 + shear[:, 1] ** 2)
         excess = size + self.mu * normal - self.H * variables.accumulated - self.adhesion
         direction = shear / np.maximum(size, 1e-300)[:, None]
         slips = excess > self.yield_tolerance * size
