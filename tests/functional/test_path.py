@@ -110,7 +110,7 @@ def test_a_run_stops_at_the_critical_level(solve):
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("seed, softening", enumerate(2 * ["linear", "exponential"]))
+@pytest.mark.parametrize("seed, softening", [*enumerate(2 * ["linear", "exponential"])])
 def test_more_strength_never_fails_earlier(solve, seed, softening):
     """Random dams of 20 to 60 m on brittle bonds, with more tensile strength, fracture energy or
     cohesion. More cohesion causes less slip and so more opening: up to 0.3 % of the level. Linear
