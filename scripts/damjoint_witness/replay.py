@@ -56,10 +56,10 @@ def law_of_joint(rows: Table, values: Values, prefix: str) -> Iterator[str]:
             size = point.K_N * abs(jump[0]) + point.K_T * hypot(jump[1], jump[2])
             room = TOLERANCE * point.strength(exact[0]) + ROUNDING * (size + abs(row[3]))
             room += NOTHING * weight
-            by_rounding = after.shear_rounding(jump)
+            room_of_shear = room + after.shear_rounding(jump)
             errors = {
                 "normal stress": abs(row[3] - exact[0]) / room,
-                "shear stress": hypot(row[4] - exact[1], row[5] - exact[2]) / (room + by_rounding),
+                "shear stress": hypot(row[4] - exact[1], row[5] - exact[2]) / room_of_shear,
                 "slip": abs(slip - point.slip()) * point.K_T / room,
             }
             if point.K_N * point.jumping(jump) > room:

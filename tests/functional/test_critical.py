@@ -852,7 +852,7 @@ BROKEN_BY_WEIGHT |= {"pena_contact": 10, "softening": "exponential"}
 @pytest.mark.heavy
 def test_the_level_of_a_dam_that_its_weight_breaks_does_not_depend_on_the_first_one():
     """For want of iterations the weight had no equilibrium: with water of 65 m it broke nothing,
-    and 71.5 m was found, with 39 m 57 m.
+    and 71.5 m was found, with 39 m 57 m; a run from 39 m stops at the level from 65 m.
     """
     answer = Search(load("dam", BROKEN_BY_WEIGHT, "65", "0"), "level").run()
     run = LoadStepper(load("dam", BROKEN_BY_WEIGHT, "39,65", "0,0", steps=16))

@@ -320,7 +320,7 @@ def partial_factors(
     """Factors of a symmetric matrix for many right-hand sides, one after the other, with the
     unknowns `keep` not eliminated; the rest must be positive definite. many: thousands of them, for
     which the eliminated unknowns of a small matrix take less time by SuperLU, whose calls take less
-    than those of MUMPS, and a dense product with those kept; the factors take longer.
+    than those of MUMPS, and a dense product with the others; the factors take longer.
 
     Raises RunError if the estimated memory is not available, MemoryError if an allocation fails.
     """

@@ -183,8 +183,8 @@ def varied(
             value, entries = settings.pop(name), zip(case.joint_names, listed, strict=True)
             settings[of_joint] = tuple(value if n == joint else v for n, v in entries)
     result = resolve(replace(case.source.with_overrides(settings), **changes))
-    kept = ("name", "record", "record_vertical", "all_steps")
-    return replace(result, **{name: getattr(case, name) for name in kept})
+    attributes = ("name", "record", "record_vertical", "all_steps")
+    return replace(result, **{name: getattr(case, name) for name in attributes})
 
 
 def check_loading(case: Case, tails: Sequence[float], of_case: bool) -> None:

@@ -96,8 +96,8 @@ class FailurePath(EquilibriumPath):
         stepper = known.stepper if known else LoadStepper(case, interface)
         #: the steps so far, see `EquilibriumPath`
         self.solved: Solved = dict(known.solved) if known else {}
-        #: whether it begins where only a run has found an equilibrium, and whether the run has
-        #: found none under the weight alone
+        #: whether it begins where only a run has an equilibrium, and whether the run has none under
+        #: the weight alone
         self.begun_by_run = self.weight_with_water = False
         #: whether relaxation has reached a higher level from which no path leads on, see `fill_on`
         self.leads_higher = False
