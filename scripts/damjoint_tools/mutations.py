@@ -224,7 +224,7 @@ MUTATIONS = (
     Mutation(
         "maximum of the damage dropped",
         "laws/bond.py",
-        "return np.maximum(progress, np.clip(share, 0, self.curve.end))",
+        "return np.maximum(progress, np.minimum(share, self.curve.end))",
         "return np.clip(share, 0, self.curve.end)",
         having("law", "bond"),
     ),
@@ -238,8 +238,8 @@ MUTATIONS = (
     Mutation(
         "equivalent jump of mixed without K_T/K_N",
         "laws/mixed.py",
-        "shear = self.ratio * (jump[:, 1:] ** 2).sum(axis=1)",
-        "shear = (jump[:, 1:] ** 2).sum(axis=1)",
+        "shear = self.ratio * (slip[0] ** 2 + slip[1] ** 2)",
+        "shear = slip[0] ** 2 + slip[1] ** 2",
         having("law", "mixed"),
     ),
     Mutation(

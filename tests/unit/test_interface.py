@@ -29,18 +29,25 @@ def interface(request):
 
 
 def test_stiffness_of_points(interface, monkeypatch):
-    """The assembly by terms is the product of sparse matrices, to the last bit."""
+    """The assembly by terms is the product of sparse matrices, and that with a dense matrix."""
     rng = np.random.default_rng(24)
     number, size = len(interface.weights), len(interface.bulk.stiffness)
-    tangent = rng.normal(size=(number, 3, 3))
+    before, stiffness = rng.normal(size=(number, 3, 3)), rng.normal(size=(size, size))
     for points in (np.arange(number), np.arange(0, number, 3), np.zeros(0, int)):
-        by_terms = interface.assembly.stiffness(tangent[points], points)
+        tangent = before.copy()
+        tangent[points] = rng.normal(size=(len(points), 3, 3))
+        added = interface.assembly.with_joints(stiffness, tangent)
+        changes = [interface.assembly.change(tangent, before)]
         with monkeypatch.context() as patch:
-            patch.setitem(vars(interface.assembly), "by_terms", None)
-            product = interface.assembly.stiffness(tangent[points], points)
-        assert by_terms.shape == (size, size)
-        for name in ("data", "indices", "indptr"):
-            assert np.array_equal(getattr(by_terms, name), getattr(product, name))
+            patch.setitem(vars(interface.assembly), "terms", None)
+            whole = interface.assembly.whole(tangent)
+            changes.append(interface.assembly.change(tangent, before))
+        assert whole.shape == (size, size)
+        least = 1e-14 * np.abs(before).sum()
+        assert_allclose(added - stiffness, whole.toarray(), rtol=1e-12, atol=least)
+        (one, rows), (other, same_rows) = changes
+        assert np.array_equal(rows, same_rows) and one.shape == other.shape == (len(rows), size)
+        assert_allclose(one.toarray(), other.toarray(), rtol=1e-12, atol=least)
 
 
 def test_two_small_interfaces_are_kept(monkeypatch):
@@ -67,6 +74,7 @@ def test_two_small_interfaces_are_kept(monkeypatch):
 def test_solution_of_the_linear_system(interface, flowing, bordered, few, by_columns, monkeypatch):
     """A third of the points with another, unsymmetric tangent; pressures that depend on some of the
     unknowns."""
+    monkeypatch.setattr(linear_system, "MOST_WHOLE", 0)
     monkeypatch.setattr(linear_system, "FEW", few)
     monkeypatch.setattr(linear_system, "BY_COLUMNS", by_columns)
     rng = np.random.default_rng(142)

@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Array, IntArray, Sparse
+from ..arrays import Array, IntArray
 from ..csr import CsrMatrix, ranges
 
-#: Number of terms up to which they are kept: more take longer than a product of scipy's matrices.
+#: Number of terms up to which they are kept: more take longer than a product of sparse matrices.
 MOST_TERMS = 500_000
 
 
@@ -25,17 +25,15 @@ class Assembly:
         self.dim = at_points.shape[0] // self.number
 
     @cached_property
-    def by_terms(self) -> Terms | None:
+    def terms(self) -> Terms | None:
         """The terms of the stiffness; None for many points, by products of sparse matrices."""
         few = number_of_terms(self.at_points, self.dim) <= MOST_TERMS
-        return Terms(self.at_points, self.dim) if few else None
+        return Terms(self.at_points, self.weights) if few else None
 
-    def stiffness(self, tangent: Array, points: IntArray) -> CsrMatrix:
-        """The stiffness (j, j) of some Gauss points with a tangent (points, 3, 3)."""
+    def product(self, tangent: Array, points: IntArray) -> CsrMatrix:
+        """The stiffness (j, j) of some Gauss points with a tangent (points, 3, 3), by products."""
         number, d = len(points), self.dim
         blocks = self.weights[points, None, None] * tangent[:, :d, :d]
-        if self.by_terms:
-            return self.by_terms.sum(blocks, points)
         rows = self.at_points[(d * points[:, None] + np.arange(d)).ravel()]
         columns = np.repeat(np.arange(d * number).reshape(number, d), d, axis=0)
         diagonal = CsrMatrix(
@@ -45,47 +43,28 @@ class Assembly:
 
     def whole(self, tangent: Array) -> CsrMatrix:
         """The stiffness (j, j) of all Gauss points with a tangent (q, 3, 3)."""
-        return self.stiffness(tangent, np.arange(self.number))
+        if self.terms:
+            return self.terms.matrix(tangent)
+        return self.product(tangent, np.arange(self.number))
 
     def change(self, tangent: Array, before: Array) -> tuple[CsrMatrix, IntArray]:
         """The change from one tangent to another (q, 3, 3), without its zero rows, and the rows."""
-        # rows: components of the traction
-        differs = (tangent != before).any(axis=2)[:, : self.dim]
-        points = np.flatnonzero(differs.any(axis=1))
-        changes = np.zeros(self.size, bool)
-        changes[self.at_points.indices[differs.ravel()[self.at_points.rows]]] = True
-        rows = np.flatnonzero(changes)
-        return self.stiffness(tangent[points] - before[points], points)[rows], rows
-
-    @cached_property
-    def operator(self) -> tuple[IntArray, Sparse]:
-        """The entries of the stiffness, among j * j, that joints have (e,), and a matrix that leads
-        to them from those of the tangents (e, q * dim * dim).
-        """
-        from scipy import sparse
-
-        d, size = self.dim, self.size
-        rows, columns, values = [], [], []
-        for q in range(self.number):
-            block = self.at_points[d * q : d * (q + 1)]
-            touched = np.unique(block.indices)
-            local = block.columns(touched).toarray()
-            # d (w B^T D B)[a, b] / d D[k, l]
-            parts = self.weights[q] * np.einsum("ka,lb->abkl", local, local)
-            entries = touched[:, None] * size + touched
-            rows.append(np.repeat(entries.ravel(), d * d))
-            columns.append(np.tile(q * d * d + np.arange(d * d), entries.size))
-            values.append(parts.ravel())
-        data, row, column = (np.concatenate(part) for part in (values, rows, columns))
-        entries, row = np.unique(row, return_inverse=True)
-        return entries, sparse.csr_matrix(
-            (data, (row, column)), (len(entries), self.number * d * d)
-        )
+        if self.terms:
+            matrix = self.terms.matrix(tangent - before)
+        else:
+            points = np.flatnonzero((tangent != before).any(axis=(1, 2)))
+            matrix = self.product(tangent[points] - before[points], points)
+        matrix = matrix.where(matrix.data != 0)
+        rows = np.flatnonzero(matrix.counts)
+        return matrix[rows], rows
 
     def with_joints(self, stiffness: Array, tangent: Array) -> Array:
-        """A stiffness (j, j) with that of all Gauss points, by one product, for few unknowns."""
-        (entries, operator), matrix = self.operator, stiffness.copy()
-        matrix.ravel()[entries] += operator @ tangent[:, : self.dim, : self.dim].ravel()
+        """A stiffness (j, j) with that of all Gauss points."""
+        matrix = stiffness.copy()
+        if self.terms:
+            matrix.ravel()[self.terms.entries] += self.terms.sums(tangent)
+        else:
+            self.whole(tangent).add_to(matrix)
         return matrix
 
 
@@ -96,49 +75,38 @@ def number_of_terms(at_points: CsrMatrix, dim: int) -> int:
 
 
 class Terms:
-    """Sum of B^T D B over Gauss points with matrices D (dim, dim): B interpolates the jump.
-
-    The pattern of the sum is that of the interpolation and is computed once; a product of sparse
-    matrices would sort it anew in every iteration of Newton's method.
+    """The stiffness as a linear function of the components of all tangents, whose pattern is that
+    of the interpolation and is computed once: a product of sparse matrices would sort it anew in
+    every iteration of Newton's method.
     """
 
-    def __init__(self, at_points: CsrMatrix, dim: int) -> None:
-        """at_points: B of all points (dim * points, j), see `Assembly`."""
-        self.dim, self.at_points, size = dim, at_points, at_points.shape[1]
-        point = at_points.rows // dim
-        number = at_points.shape[0] // dim
-        pairs, entry = np.unique(point * size + at_points.indices, return_inverse=True)
-        #: pairs of a point and an unknown on which its jump depends, and B of them (dim, pairs)
-        self.point, unknown = np.divmod(pairs, size)
-        self.values = np.zeros((dim, len(pairs)))
-        self.values[at_points.rows % dim, entry] = at_points.data
-        counts = np.bincount(self.point, minlength=number)
+    def __init__(self, at_points: CsrMatrix, weights: Array) -> None:
+        """See `Assembly`."""
+        number, size, data = len(weights), at_points.shape[1], at_points.data
+        self.dim, self.size = at_points.shape[0] // number, size
+        point, component = np.divmod(at_points.rows, self.dim)
+        counts = np.bincount(point, minlength=number)
         starts = np.cumsum(counts) - counts
-        #: a term: an entry of B times a pair of the same point, point by point
-        self.entry = np.repeat(np.arange(len(point)), counts[point])
-        self.pair = ranges(starts[point], counts[point])
-        self.component = at_points.rows[self.entry] % dim
-        numbers = at_points.indices[self.entry] * size + unknown[self.pair]
-        #: number of each term among the entries of the stiffness, and their rows and columns
-        numbers, self.number = np.unique(numbers, return_inverse=True)
-        self.rows, self.columns = np.divmod(numbers, size)
-        self.terms = np.bincount(point, counts[point], number).astype(int)
-        self.starts = np.cumsum(self.terms) - self.terms
+        # a term: two entries of B of the same point, point by point
+        one = np.repeat(np.arange(len(point)), counts[point])
+        other = ranges(starts[point], counts[point])
+        numbers = at_points.indices[one] * size + at_points.indices[other]
+        #: the entries of the stiffness, among j * j, that joints have, and their rows and columns
+        self.entries, entry = np.unique(numbers, return_inverse=True)
+        rows, self.columns = np.divmod(self.entries, size)
+        self.pointers = np.searchsorted(rows, np.arange(size + 1))
+        #: what leads to them from the components of the tangents (e, q * dim * dim)
+        self.operator = CsrMatrix.of_entries(
+            weights[point[one]] * data[one] * data[other],
+            entry,
+            (point[one] * self.dim + component[one]) * self.dim + component[other],
+            (len(self.entries), number * self.dim**2),
+        )
 
-    def sum(self, blocks: Array, points: IntArray) -> CsrMatrix:
-        """The matrix (j, j) of some points, by their D (points, dim, dim)."""
-        size = self.at_points.shape[1]
-        every = np.zeros((len(self.terms), self.dim, self.dim))
-        every[points] = blocks
-        every = every[self.point]
-        products = every[:, :, 0].T * self.values[0]
-        for k in range(1, self.dim):
-            products += every[:, :, k].T * self.values[k]
-        some = ranges(self.starts[points], self.terms[points])
-        terms = self.at_points.data[self.entry[some]]
-        terms *= products[self.component[some], self.pair[some]]
-        number, used = self.number[some], np.zeros(len(self.rows), bool)
-        used[number] = True
-        data = np.asarray(np.bincount((np.cumsum(used) - 1)[number], terms), float)
-        pointers = np.searchsorted(self.rows[used], np.arange(size + 1))
-        return CsrMatrix(data, self.columns[used], pointers, (size, size))
+    def sums(self, tangent: Array) -> Array:
+        """The entries (e,) for a tangent (q, 3, 3)."""
+        return self.operator @ tangent[:, : self.dim, : self.dim].ravel()
+
+    def matrix(self, tangent: Array) -> CsrMatrix:
+        """The matrix (j, j) for a tangent (q, 3, 3)."""
+        return CsrMatrix(self.sums(tangent), self.columns, self.pointers, (self.size, self.size))

@@ -68,12 +68,10 @@ class Equilibrium:
 
     def keep_loads(self) -> None:
         """Keep the last loads."""
-        #: forces on the functions of a face under the tailwater, by its name and level: of the last
-        self.tail_forces = lru_cache(maxsize=4)(
-            lambda name, tail: self.face_forces(self.interface.faces[name], Loading(0.0, tail))
-        )
         #: unit loads by the parts of the loads that act
         self.sizes = lru_cache(maxsize=4)(lambda grown: self.unit_loads(Loading(0.0, 0.0, grown)))
+        #: what does not follow the level of the next, by the tailwater and the parts of the loads
+        self.other_forces = lru_cache(maxsize=4)(self._other_forces)
         #: forces on the loaded unknowns and t_0; with the water in the joints: of the last loadings
         self.external_forces = lru_cache(maxsize=8)(self._external_forces)
         self.loads = lru_cache(maxsize=8)(self._loads)
@@ -117,13 +115,14 @@ class Equilibrium:
         level = loading.tail if face.side in BY_TAIL else loading.level
         if case["face_load"] == "uniform":
             pressure = np.full(len(face.y), self.unit_weight * level)
-            return face.spread(-pressure[:, None] * face.normals)
+            return face.pressed(pressure)
         added = AddedPressure(0.0, self.interface.floor)
-        if face.side == "up":
+        if face.side == "up" and loading.part("quake"):
             added = AddedPressure.of(case, loading, self.interface.floor)
 
         def height(level: float, y: Array, tilt: Array) -> Array:
-            return np.maximum(level - y, 0) + added.height(level, y, tilt)
+            depth = np.maximum(level - y, 0)
+            return depth + added.height(level, y, tilt) if added.size else depth
 
         def column(level: float, low: float, high: float) -> tuple[float, float]:
             at_rest = water_column(level, low, high)
@@ -156,21 +155,27 @@ class Equilibrium:
         loads |= thermal_strains(case, loading)
         return {name: value for name, value in loads.items() if value and name in self.bulk.units}
 
+    def forces_on_faces(self, loading: Loading, by_tail: bool) -> Array:
+        """Forces (m,) on the loaded unknowns, of the faces under the tailwater or of the others."""
+        forces = np.zeros(self.bulk.pressure.shape[1])
+        for name, face in self.interface.faces.items():
+            if (face.side in BY_TAIL) == by_tail:
+                dofs, functions = self.loaded[name]
+                np.add.at(forces, dofs, self.face_forces(face, loading)[functions])
+        return forces
+
+    def _other_forces(self, tail: float, grown: tuple[float, ...]) -> tuple[Array, Array]:
+        forces = self.forces_on_faces(Loading(0.0, tail), by_tail=True)
+        total = self.bulk.pressure @ forces
+        for name, size in self.sizes(grown).items():
+            total += size * self.bulk.units[name]
+        return forces, total
+
     def _external_forces(self, loading: Loading) -> tuple[Array, Array]:
         """Forces on the loaded unknowns (m,), and t_0 (j,) of them and of the unit loads."""
-        bulk = self.bulk
-        forces = np.zeros(bulk.pressure.shape[1])
-        for name, face in self.interface.faces.items():
-            by_tail = face.side in BY_TAIL
-            on_face = (
-                self.tail_forces(name, loading.tail) if by_tail else self.face_forces(face, loading)
-            )
-            dofs, functions = self.loaded[name]
-            np.add.at(forces, dofs, on_face[functions])
-        total = bulk.pressure @ forces
-        for name, size in self.sizes(loading.grown).items():
-            total += size * bulk.units[name]
-        return forces, total
+        forces, total = self.other_forces(loading.tail, loading.grown)
+        by_level = self.forces_on_faces(loading, by_tail=False)
+        return forces + by_level, total + self.bulk.pressure @ by_level
 
     def _loads(self, loading: Loading) -> Array:
         """t_0 and, unless it flows, the water in the joints together (j,)."""

@@ -119,9 +119,8 @@ def harmonic(laplace: CsrMatrix, fixed: IntArray, values: Array) -> Array:
 class FlowSystem:
     """A solved flow problem, for derivatives of its pressure, and its share in a mean of such."""
 
-    #: gradient of the total head times the water's weight at the Gauss points, along each of
-    #: JointFields.slopes
-    gradients: list[Array]
+    #: see `gradients`; only derivatives and fluxes need them
+    gradients_of: Callable[[], list[Array]]
     #: product of the inverse flow matrix with a matrix (inner nodes, m)
     inverse: Callable[[Array], Array]
     #: the same for other conductivities (q,): of a change across the flow, and along it
@@ -130,6 +129,13 @@ class FlowSystem:
     #: derivative of the flux with the gradient, and with the aperture, over those of the cubic law
     #: (q,); None: it is that law
     slowed: Array | None = None
+
+    @cached_property
+    def gradients(self) -> list[Array]:
+        """Gradient of the total head times the water's weight at the Gauss points, along each of
+        JointFields.slopes.
+        """
+        return self.gradients_of()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -403,7 +409,10 @@ class Flow:
         heads[drains] = drained
         known[self.fields.ends] = known[drains] = True
         while True:  # one that is closed lowers all heads: none of these opens again
-            solution, inflow = solve(conductivity, imposed, heads, known)
+            solution, inflow_of = solve(conductivity, imposed, heads, known)
+            if not len(exits):
+                return solution
+            inflow = inflow_of()
             entering = exits[known[exits] & (inflow[exits] > ENTERS * np.abs(inflow).max())]
             if not len(entering):
                 return solution
@@ -437,7 +446,7 @@ class Flow:
 
     def _in_lines(
         self, conductivity: Array, imposed: Array, heads: Array, known: BoolArray
-    ) -> tuple[FlowSolution, Array]:
+    ) -> tuple[FlowSolution, Callable[[], Array]]:
         """2D: the elements are resistances in series, between nodes of known heads and, in a
         network, branchings. The solution, and what enters at the nodes.
 
@@ -446,23 +455,25 @@ class Flow:
         """
         cut = self.cut_lines(known.tobytes())
         resistance, parts = self.series(conductivity, known)
-        drops = np.zeros(len(resistance))
         ends, wholes = cut.ends, np.array([whole for *_, whole in parts])
         if cut.join:
             heads, differences = junction_heads(heads, known, ends, 1 / wholes)
         else:
             differences = heads[ends[:, 1]] - heads[ends[:, 0]]
         total = heads.copy()
-        for (cells, _), (nodes, before, behind, whole), difference in zip(
-            cut.pieces, parts, differences, strict=True
-        ):
+        for nodes, before, behind, whole in parts:
             first, last = heads[nodes[0]], heads[nodes[-1]]
-            total[nodes] = first * behind / whole + last * before / whole
-            drops[cells] = difference * resistance[cells] / whole
-        steepness = (drops / self.lengths)[self.points.elements]
+            total[nodes] = (first * behind + last * before) / whole
+
+        def gradients() -> list[Array]:
+            drops = np.zeros(len(resistance))
+            for (cells, _), whole, difference in zip(cut.pieces, wholes, differences, strict=True):
+                drops[cells] = difference * resistance[cells] / whole
+            steepness = (drops / self.lengths)[self.points.elements]
+            return [steepness * t for t in self.towards]
 
         def inverse_of(_: Array, along: Array) -> Callable[[Array], Array]:
-            other, _ = self._in_lines(along, imposed, heads, known)
+            other = self._in_lines(along, imposed, heads, known)[0]
             return other.systems[0].inverse
 
         def inverse(coupling: Array) -> Array:
@@ -475,16 +486,15 @@ class Flow:
                 green[np.ix_(at, at)] += products / whole
             return green @ coupling
 
-        inflow = np.zeros(len(total))
-        np.add.at(inflow, ends, np.outer(differences / wholes, [-1, 1]))
+        def inflow() -> Array:
+            entering = np.zeros(len(total))
+            np.add.at(entering, ends, np.outer(differences / wholes, [-1, 1]))
+            return entering
+
         solution = FlowSolution(
             pressure=total[self.inside] - imposed[self.inside],
             systems=[
-                FlowSystem(
-                    gradients=[steepness * t for t in self.towards],
-                    inverse=inverse,
-                    inverse_of=inverse_of,
-                )
+                FlowSystem(gradients_of=gradients, inverse=inverse, inverse_of=inverse_of),
             ],
         )
         return solution, inflow
@@ -550,7 +560,7 @@ class Flow:
 
     def _on_surface(
         self, conductivity: Array, imposed: Array, heads: Array, known: BoolArray
-    ) -> tuple[FlowSolution, Array]:
+    ) -> tuple[FlowSolution, Callable[[], Array]]:
         """3D: one symmetric positive definite system; nan if the ratio of the conductivities is too
         large for it. The solution, and what enters at the nodes.
         """
@@ -564,7 +574,7 @@ class Flow:
             total[nodes] -= linalg.cho_solve(factor, matrix[nodes] @ total)
         except (np.linalg.LinAlgError, ValueError):
             nothing = np.full(len(self.inside), np.nan)
-            return FlowSolution(pressure=nothing, systems=[]), np.zeros(len(total))
+            return FlowSolution(pressure=nothing, systems=[]), lambda: np.zeros(len(total))
 
         def inverse_by(factor: Any) -> Callable[[Array], Array]:
             def inverse(coupling: Array) -> Array:
@@ -582,10 +592,14 @@ class Flow:
         solution = FlowSolution(
             pressure=(total - imposed)[self.inside],
             systems=[
-                FlowSystem(gradients=gradients, inverse=inverse_by(factor), inverse_of=inverse_of)
+                FlowSystem(
+                    gradients_of=lambda: gradients,
+                    inverse=inverse_by(factor),
+                    inverse_of=inverse_of,
+                )
             ],
         )
-        return solution, np.asarray(matrix @ total, float)
+        return solution, lambda: np.asarray(matrix @ total, float)
 
     @cached_property
     def couplings(self) -> list[Coupling]:

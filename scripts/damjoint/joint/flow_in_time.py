@@ -185,7 +185,7 @@ class WaterBalance:
                     pressure=(total - imposed)[self.flow.inside],
                     systems=[
                         FlowSystem(
-                            gradients=system.gradients,
+                            gradients_of=partial(getattr, system, "gradients"),
                             inverse=system.inverse,
                             inverse_of=partial(self.inverse_of, ground, fixed, system.gradients),
                         )

@@ -32,6 +32,8 @@ from .flow import Flow, FlowDerivative
 #: Number of unknowns up to which thousands of systems of one matrix S, few for each time step, are
 #: solved faster by factorising each than by Woodbury's formula.
 MOST_DENSE = 400
+#: The same of any systems.
+MOST_WHOLE = 100
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,7 @@ class LinearSystem(Protocol):
 
 
 class DenseSystem:
-    """Assembled and factorised anew for each tangent; no border."""
+    """Assembled and factorised anew for each tangent."""
 
     def __init__(self, assembly: Assembly, stiffness: Array) -> None:
         """stiffness: S (j, j)."""
@@ -92,7 +94,7 @@ class DenseSystem:
         self, tangent: Tangent, right: Array, border: Border | None = None
     ) -> tuple[Array, Any]:
         """See `LinearSystem`."""
-        return lu_solve(self.matrix(tangent), right), 0.0
+        return solve_whole(self.matrix(tangent), right, border)
 
     def matrix(self, tangent: Tangent) -> Array:
         """S + K (j, j), by dense products, which are faster for few unknowns."""
@@ -102,28 +104,16 @@ class DenseSystem:
         return matrix
 
 
-class WoodburySystem:
-    """By the inverse of the matrix with undamaged joints; the matrix itself is factorised if it is
-    small and more than half of its rows change.
+class WoodburySystem(DenseSystem):
+    """By the inverse of the matrix with undamaged joints; the matrix itself is factorised if it has
+    very few unknowns, or few and more than half of its rows change.
     """
 
     def __init__(self, assembly: Assembly, stiffness: Array, undamaged: Array) -> None:
         """stiffness: S (j, j); undamaged: tangent (q, 3, 3) of the undamaged joints."""
-        self.assembly, self.stiffness, self.undamaged = assembly, stiffness, undamaged
-        #: B (j, p), the nodal forces of the pressures of flowing water
-        self.lift = lru_cache(maxsize=1)(lift_matrix)
+        super().__init__(assembly, stiffness)
+        self.undamaged = undamaged
         self._by_pressure: tuple[CsrMatrix, Array] | None = None
-
-    def matrix(self) -> Array:
-        """A_0 (j, j)."""
-        matrix = self.stiffness.copy()
-        self.assembly.whole(self.undamaged).add_to(matrix)
-        return matrix
-
-    @cached_property
-    def small_matrix(self) -> Array | None:
-        """A_0 of few unknowns."""
-        return self.matrix() if len(self.stiffness) <= FEW else None
 
     @cached_property
     def compliance(self) -> Array:
@@ -131,7 +121,7 @@ class WoodburySystem:
 
         Raises LinAlgError if A_0 is not positive definite: the joint does not support the dam.
         """
-        return positive_inverse(self.matrix() if self.small_matrix is None else self.small_matrix)
+        return positive_inverse(self.matrix(Tangent(self.undamaged)))
 
     def by_pressure(self, lift: CsrMatrix) -> Array:
         """C B (j, p), the jumps by unit pressures; the last one is kept."""
@@ -143,22 +133,18 @@ class WoodburySystem:
         self, tangent: Tangent, right: Array, border: Border | None = None
     ) -> tuple[Array, Any]:
         """See `LinearSystem`."""
+        if len(right) <= MOST_WHOLE:
+            return super().solve(tangent, right, border)
         compliance, flow = self.compliance, tangent.flow
         law, rows = self.assembly.change(tangent.law, self.undamaged)
         lift = self.lift(tangent.flowing) if flow else None
         m = len(rows)
         size = m + (len(flow.pressure) if flow else 0)
-        if self.small_matrix is not None and size > len(right) / 2:
+        if len(right) <= FEW and size > len(right) / 2:
             columns = distinct(np.concatenate([law.indices, flow.columns if flow else NO_COLUMNS]))
             if len(columns) <= BY_COLUMNS * len(right):
                 return self.solve_columns(law, rows, columns, tangent, right, border)
-            whole = np.empty((len(right) + (border is not None),) * 2)
-            matrix = whole[: len(right), : len(right)]
-            matrix[:] = self.small_matrix
-            matrix[rows[law.rows], law.indices] += law.data
-            if flow and lift:
-                matrix[:, flow.columns] -= lift @ flow.pressure
-            return solve_whole(whole, right, border)
+            return super().solve(tangent, right, border)
         start = compliance @ right
         small = np.zeros((size + (border is not None),) * 2)
         small_right = np.zeros((len(small), *right.shape[1:]))
@@ -247,11 +233,12 @@ def many_systems(assembly: Assembly, stiffness: Array, undamaged: Array) -> Line
     return WoodburySystem(assembly, stiffness, undamaged)
 
 
-def solve_whole(whole: Array, right: Array, border: Border | None) -> tuple[Array, Any]:
-    """Solve A x = right (j, ...), by LU; A has room for a border, and may be overwritten."""
+def solve_whole(matrix: Array, right: Array, border: Border | None) -> tuple[Array, Any]:
+    """Solve A x = right (j, ...), bordered or not, by LU; A may be overwritten."""
     if border is None:
-        return lu_solve(whole, right), 0.0
-    matrix = whole[:-1, :-1]
+        return lu_solve(matrix, right), 0.0
+    whole = np.empty((len(right) + 1,) * 2)
+    whole[:-1, :-1] = matrix
     # a row of the size of the others, for the choice of the pivots
     scale = max(matrix.max(), -matrix.min()) / (np.abs(border.row).max() or 1)
     whole[:-1, -1] = border.slope

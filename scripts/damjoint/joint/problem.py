@@ -158,5 +158,5 @@ def rate(
         return of(unknown.at(loading, unknown.of(loading) + 1)) - of(loading)
     step = DIFFERENCE * max(size, abs(loading.level))
     level = loading.level if abs(loading.level) > EMPTY * size else SMALL_LEVEL * size
-    above, below = (replace(loading, level=level + s) for s in (step, -step))
+    above, below = (unknown.at(loading, level + s) for s in (step, -step))
     return (of(above) - of(below)) / (2 * step)

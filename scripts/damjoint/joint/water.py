@@ -623,6 +623,11 @@ class WaterSystem:
         may = [w.case["turbulent"] and w.case["uplift"] == "flow" for w in self.members]
         return np.repeat(np.array(may, bool), [len(w.joint.points.weights) for w in self.members])
 
+    @cached_property
+    def may_be_turbulent(self) -> bool:
+        """Whether it may be anywhere."""
+        return bool(self.turbulent.any())
+
     @property
     def drain_effectiveness(self) -> float:
         """Of its drains, the same for all; 0 without drains."""
@@ -766,7 +771,7 @@ class FlowAtLoading:
             return in_time(conductivity) if in_time else self.steady(conductivity, nodes, drained)
 
         laminar = system.reference * conductivity if step else conductivity
-        if not system.turbulent.any():
+        if not system.may_be_turbulent:
             return flow_by(laminar)
         like = len(nodes), step.part if step else 0
         per_gradient = 2 * system.reference * conductivity / system.flow.points.weights

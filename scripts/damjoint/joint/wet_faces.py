@@ -37,34 +37,42 @@ class WetFace:
         self.normals = surface.normals[self.points.elements][:, :dim]
         self.to_functions = self.points.values.T
         self.y, self.tilt = self.points.positions[:, 1], np.abs(self.normals[:, 0])
+        self.above = self.y - self.low
         straight, self.exact = self.high > self.low, not side_points
         self.flat = np.ptp(surface.points[:, 1]) < ROUND_OFF * np.abs(surface.points).max()
         #: whether the quadrature is corrected
         self.corrects = self.exact and straight and not self.flat
 
     @cached_property
-    def powers(self) -> list[Array]:
-        """Heights of the points above the lowest end to the power of 0, 1 and 2."""
-        return [(self.y - self.low) ** k for k in range(3)]
+    def weights(self) -> Array:
+        """Weights times heights above the lowest end to the power of 0, 1 and 2 (3, q)."""
+        return np.array([self.points.weights * self.above**k for k in range(3)])
+
+    @cached_property
+    def inwards(self) -> Array:
+        """Weights of the points along the normals, into the body (q, dim)."""
+        return -self.points.weights[:, None] * self.normals
 
     @cached_property
     def elements(self) -> list[tuple[str, IntArray]]:
         """Shape and functions of each element."""
         return [(shape, row) for shape, table in self.space.connectivity for row in table]
 
-    def spread(self, traction: Array) -> Array:
-        """Nodal forces of a traction (q, dim) [Pa]."""
-        return np.ravel(self.to_functions @ (self.points.weights[:, None] * traction))
+    def pressed(self, pressure: Array) -> Array:
+        """Nodal forces of a pressure (q,) [Pa]."""
+        return np.ravel(self.to_functions @ (pressure[:, None] * self.inwards))
 
     def press(self, level: float, height: Height, column: Column) -> Array:
         """Nodal forces [m x area] of a height of pressure on the face."""
         if level <= self.low:
             return np.zeros(self.to_functions.shape[0] * self.dim)
         if self.corrects:
-            return self.spread(-self.corrected(level, height, column)[:, None] * self.normals)
+            return self.pressed(self.corrected(level, height, column))
         cut = self.cut_by(level) if self.exact and not self.flat else np.zeros(0, int)
-        outside = ~np.isin(self.points.elements, cut)
-        forces = self.spread(-(height(level, self.y, self.tilt) * outside)[:, None] * self.normals)
+        heights = height(level, self.y, self.tilt)
+        if len(cut):
+            heights *= ~np.isin(self.points.elements, cut)
+        forces = self.pressed(heights)
         for element in cut:
             self.add_wet_part(forces, int(element), level, height)
         return forces
@@ -78,19 +86,19 @@ class WetFace:
         stretch = self.points.weights.sum() / (self.high - self.low)
         force, moment = (stretch * part for part in column(level, self.low, self.high))
         moment -= force * self.low
-        y, shape_level = self.y - self.low, level
         if force == 0:
-            return np.zeros_like(y)
+            return np.zeros_like(self.y)
+        shape_level = level
         while True:
             shape = height(shape_level, self.y, self.tilt)
-            m0, m1, m2 = (self.points.weights @ (shape * power) for power in self.powers)
+            m0, m1, m2 = self.weights @ shape
             determinant = m0 * m2 - m1**2
             if determinant > DISTINCT * m1**2 or shape_level > self.high:
                 break
             shape_level = max(shape_level, self.low) + RAISE * (self.high - self.low)
         b = (m0 * moment - m1 * force) / determinant
         a = (force - b * m1) / m0
-        return np.asarray(shape * (a + b * y))
+        return np.asarray(shape * (a + b * self.above))
 
     # -- elements that the waterline cuts
 

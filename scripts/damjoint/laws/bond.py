@@ -97,7 +97,7 @@ class Bond(SofteningLaw[BondVariables]):
     def progress_by_opening(self, opening: Array, progress: Array) -> Array:
         """The progress after an opening (q,) [m]."""
         share = (opening - self.delta_e) / (self.delta_c - self.delta_e)
-        return np.maximum(progress, np.clip(share, 0, self.curve.end))
+        return np.maximum(progress, np.minimum(share, self.curve.end))
 
     def slip_opening(self, excess: Array, size: Array, opened: Array) -> Array:
         """The slip (q,) [m] if the damage by opening governs."""
@@ -113,7 +113,7 @@ class Bond(SofteningLaw[BondVariables]):
         before, curve = variables.progress, self.curve
         per_slip = self.progress_per_slip if frozen is None else 0.0
         shear = self.K_T * (jump[:, 1:] - variables.plastic)
-        size = np.linalg.norm(shear, axis=1)
+        size = np.hypot(shear[:, 0], shear[:, 1])
         excess = size + self.mu * self.K_N * np.minimum(jump[:, 0], 0)  # over friction
         opened = self.progress_by_opening(jump[:, 0], before) if frozen is None else frozen
         slip_opening = self.slip_opening(excess, size, opened)
@@ -126,9 +126,7 @@ class Bond(SofteningLaw[BondVariables]):
             size=size,
             direction=shear / np.maximum(size, 1e-300)[:, None],
             slip=np.where(opening_governs, slip_opening, by_slip),
-            progress=np.where(
-                opening_governs, opened, np.where(broken_by_slip, curve.end, softened)
-            ),
+            progress=np.where(opening_governs, opened, np.minimum(softened, curve.end)),
             opening_governs=opening_governs,
             broken_by_slip=broken_by_slip,
         )
@@ -155,12 +153,12 @@ class Bond(SofteningLaw[BondVariables]):
         loss = self.cohesion * self.curve.rate(step.progress)  # of cohesion with the progress
         K_soft = self.K_T - loss * per_slip
         growing = step.opening_governs & (step.progress > before) & (step.progress < self.curve.end)
-        opened_rate = np.where(growing, 1 / (self.delta_c - self.delta_e), 0)
+        opened_rate = growing * (1 / (self.delta_c - self.delta_e))
         softens = ~(step.opening_governs | step.broken_by_slip)  # the slip does the damage
-        stiffness, slides = np.where(softens, K_soft, self.K_T), step.slip > 0
-        by_norm = self.K_T / stiffness * slides
+        compliance = (step.slip > 0) / np.where(softens, K_soft, self.K_T)
+        by_norm = self.K_T * compliance
         friction_rate = self.mu * self.K_N * (opening < 0)
-        by_opening = (friction_rate + loss * opened_rate) / stiffness * slides
+        by_opening = (friction_rate + loss * opened_rate) * compliance
         damaging = np.asarray(per_slip * softens, float)
         return by_norm, by_opening, damaging, opened_rate + damaging * by_opening
 
@@ -176,22 +174,24 @@ class Bond(SofteningLaw[BondVariables]):
         unloading, unloading_rate = self.unloading_stiffness(step.progress)
         closed, n = opening <= 0, step.direction
         broken = (step.progress >= self.curve.end) | (self.tensile_strength == 0)
-        normal = np.where(closed, self.K_N, unloading) * opening
-        traction = np.column_stack([normal, (step.size - self.K_T * step.slip)[:, None] * n])
+        traction = np.empty((len(jump), 3))
+        traction[:, 0] = np.where(closed, self.K_N, unloading) * opening
+        traction[:, 1:] = (step.size - self.K_T * step.slip)[:, None] * n
 
-        tangent = np.zeros((len(jump), 3, 3))
-        bonded = unloading + opening * unloading_rate * progress_by_opening
+        tangent = np.empty((len(jump), 3, 3))
+        loss = opening * unloading_rate
+        bonded = unloading + loss * progress_by_opening
         open_stiffness = np.where(broken, self.artificial * self.K_N, bonded)
         tangent[:, 0, 0] = np.where(closed, self.K_N, open_stiffness)
-        by_slip = opening * unloading_rate * progress_by_slip * by_norm
-        tangent[:, 0, 1:] = np.where(closed | broken, 0, by_slip)[:, None] * n
+        by_slip = np.where(closed | broken, 0, loss * progress_by_slip * by_norm)
+        tangent[:, 0, 1:] = by_slip[:, None] * n
         tangent[:, 1:, 0] = (-self.K_T * by_opening)[:, None] * n
-        outer, eye = n[:, :, None] * n[:, None, :], np.eye(2)
-        tangent[:, 1:, 1:] = self.K_T * (
-            self.remaining(step)[:, None, None] * (eye - outer)
-            + (1 - by_norm)[:, None, None] * outer
-            + self.artificial * eye
-        )
+        remaining = self.remaining(step)  # across n, and 1 - by_norm along it
+        along = (self.K_T * (1 - by_norm - remaining))[:, None] * n
+        tangent[:, 1:, 1:] = along[:, :, None] * n[:, None, :]
+        across = self.K_T * (remaining + self.artificial)
+        tangent[:, 1, 1] += across
+        tangent[:, 2, 2] += across
         return traction, tangent
 
     def secant_stiffness(

@@ -45,41 +45,37 @@ class EndoVariables:
     plastic: Array
 
 
-class Flow(NamedTuple):
-    """The plastic flow of a step; components of a vector: n, t1, t2."""
-
-    #: growth of the plastic jump (q, 3) and its multiplier (q,) [m]
-    growth: Array
-    multiplier: Array
-    #: normal of the yield surface (q, 3): mu and the direction of the shear
-    normal: Array
-    #: shear of the elastic trial (q,) [Pa]; stiffness of X against the plastic jump (q, 3) [Pa/m]
-    size: Array
-    stiffness: Array
-    #: whether X returns to the apex (q,)
-    apex: BoolArray
-
-
 class PlasticReturn(NamedTuple):
-    """The return to the yield surface at a given damage; components of a vector: n, t1, t2."""
+    """The return to the yield surface at a given damage; arrays (q,)."""
 
-    #: plastic jump (q, 3) [m], and its derivative with the elastic trial stress (q, 3, 3) [m/Pa]
-    plastic: Array
-    compliance: Array
-    #: derivative of the plastic stress -K p with the damage (q, 3) [Pa]
-    coupling: Array
+    #: plastic jump [m]: n, t1, t2
+    plastic: tuple[Array, Array, Array]
+    #: direction of the shear of the elastic trial: t1, t2
+    direction: tuple[Array, Array]
+    #: derivative of the plastic jump with the elastic trial stress [m/Pa]: n n, n along this
+    #: direction, along it, across it
+    compliance: tuple[Array, Array, Array, Array]
+    #: derivative of the plastic jump with the damage, with the other sign [m]: n, along, across
+    decline: tuple[Array, Array, Array]
     #: energy that one unit of damage releases, over G_f, and -d/d alpha of it (q,)
     release_rate: Array
     decrease: Array
+
+    def in_plane(self, along: Array, across: Array) -> tuple[Array, Array]:
+        """Components t1, t2 of a vector along and across the direction of the shear."""
+        t1, t2 = self.direction
+        return t1 * along - t2 * across, t2 * along + t1 * across
 
 
 def degradation(alpha: Array) -> tuple[Array, Array, Array]:
     """S = (1 - alpha)^3/sqrt(alpha) and its first two derivatives."""
     rest = 1 - alpha
+    share = rest / np.sqrt(alpha)
+    rate = share / alpha
     return (
-        rest**3 / np.sqrt(alpha),
-        -(rest**2) * (2.5 * alpha + 0.5) / alpha**1.5,
-        rest * (3.75 * alpha**2 + 1.5 * alpha + 0.75) / alpha**2.5,
+        share * rest**2,
+        -rate * rest * (2.5 * alpha + 0.5),
+        rate / alpha * (3.75 * alpha**2 + 1.5 * alpha + 0.75),
     )
 
 
@@ -138,54 +134,46 @@ class Endo(SofteningLaw[EndoVariables]):
     ) -> EndoVariables:
         """See `Law`; the damage that a step does is known after it, also if it is frozen in it."""
         alpha = self.damaged(jump, variables)
-        plastic = self.plastic_return(jump, variables, alpha).plastic
-        return EndoVariables(alpha, plastic[:, [1, 2, 0]])
+        normal, *shear = self.plastic_return(jump, variables, alpha).plastic
+        return EndoVariables(alpha, np.column_stack([*shear, normal]))
 
     # -- the return at a given damage, as in pro/law_endo.pro
-
-    def elastic_trial(self, jump: Array, before: Array, S: Array) -> Array:
-        """X with the plastic jump before the step (q, 3) [Pa]."""
-        return np.asarray(self.K * (jump - before) - S[:, None] * self.B * before)
-
-    def flow(self, trial: Array, S: Array) -> Flow:
-        """The flow that returns an elastic trial of X to the yield surface, or to its apex."""
-        stiffness = self.K + S[:, None] * self.B
-        size = np.linalg.norm(trial[:, 1:], axis=1)
-        direction = trial[:, 1:] / np.maximum(size, 1e-300)[:, None]
-        normal = np.column_stack([np.full(len(direction), self.mu), direction])
-        stiff = stiffness[:, 1] + self.mu**2 * stiffness[:, 0]
-        multiplier = np.maximum(size + self.mu * trial[:, 0], 0) / stiff
-        apex = (multiplier > 0) & (size < stiffness[:, 1] * multiplier)
-        growth = np.where(apex[:, None], trial / stiffness, multiplier[:, None] * normal)
-        return Flow(growth, multiplier, normal, size, stiffness, apex)
-
-    def compliance(self, flow: Flow) -> Array:
-        """Derivative of the plastic jump with the elastic trial (q, 3, 3) [m/Pa]."""
-        stiff = flow.stiffness[:, 1] + self.mu**2 * flow.stiffness[:, 0]
-        flows, direction = flow.multiplier > 0, flow.normal[:, 1:]
-        compliance = flows[:, None, None] * flow.normal[:, :, None] * flow.normal[:, None, :]
-        compliance /= stiff[:, None, None]
-        across = flow.multiplier / np.maximum(flow.size, 1e-300)
-        outer = direction[:, :, None] * direction[:, None, :]
-        compliance[:, 1:, 1:] += across[:, None, None] * (np.eye(2) - outer)
-        compliance[flow.apex] = np.eye(3) / flow.stiffness[flow.apex][:, None, :]
-        return np.asarray(compliance)
 
     def plastic_return(self, jump: Array, variables: EndoVariables, alpha: Array) -> PlasticReturn:
         """The plastic jump of least energy at a damage (q,), and what a unit of damage releases."""
         S, dS, d2S = degradation(np.maximum(alpha, LEAST))
-        before = variables.plastic[:, [2, 0, 1]]
-        flow = self.flow(self.elastic_trial(jump, before, S), S)
-        plastic, compliance = before + flow.growth, self.compliance(flow)
-        back = self.B * plastic
-        relief = np.einsum("qij,qj->qi", compliance, back)  # -dp/dS
-        work = np.einsum("qi,qi->q", back, plastic)
+        (K_n, K_t, _), (B_n, B_t, _), mu = self.K, self.B, self.mu
+        (d_n, d_1, d_2), (before_1, before_2, before_n) = jump.T, variables.plastic.T
+        # the elastic trial of X = sigma - S B p
+        stiff_n, stiff_t, back = K_n + S * B_n, K_t + S * B_t, S * B_t
+        X_n = K_n * (d_n - before_n) - S * B_n * before_n
+        X_1, X_2 = (K_t * (d - p) - back * p for d, p in ((d_1, before_1), (d_2, before_2)))
+        size = np.hypot(X_1, X_2)
+        least = np.maximum(size, 1e-300)
+        t_1, t_2 = np.where(size > 0, X_1 / least, 1.0), X_2 / least
+        # the flow along the normal (mu, 1) of the yield surface, or to its apex
+        stiff = stiff_t + mu**2 * stiff_n
+        multiplier = np.maximum(size + mu * X_n, 0) / stiff
+        flows = multiplier > 0
+        apex = flows & (size < stiff_t * multiplier)
+        smooth, to_n, to_t = flows / stiff, 1 / stiff_n, 1 / stiff_t
+        nn, na = np.where(apex, to_n, mu**2 * smooth), np.where(apex, 0, mu * smooth)
+        aa, cc = np.where(apex, to_t, smooth), np.where(apex, to_t, multiplier / least)
+        p_n = before_n + np.where(apex, X_n * to_n, mu * multiplier)
+        slip = np.where(apex, size * to_t, multiplier)
+        p_1, p_2 = before_1 + slip * t_1, before_2 + slip * t_2
+        # the back stress B p along n, along the shear and across it
+        b_n, b_a, b_c = B_n * p_n, B_t * (t_1 * p_1 + t_2 * p_2), B_t * (t_1 * p_2 - t_2 * p_1)
+        decline = dS * (nn * b_n + na * b_a), dS * (na * b_n + aa * b_a), dS * (cc * b_c)
+        work = (b_n * p_n + B_t * (p_1**2 + p_2**2)) / (2 * self.energy)
+        relieved = (b_n * decline[0] + b_a * decline[1] + b_c * decline[2]) / self.energy
         return PlasticReturn(
-            plastic,
-            compliance,
-            self.K * relief * dS[:, None],
-            -dS * work / (2 * self.energy),
-            (d2S * work / 2 - dS**2 * np.einsum("qi,qi->q", back, relief)) / self.energy,
+            plastic=(p_n, p_1, p_2),
+            direction=(t_1, t_2),
+            compliance=(nn, na, aa, cc),
+            decline=decline,
+            release_rate=-dS * work,
+            decrease=d2S * work - dS * relieved,
         )
 
     def damaged(self, jump: Array, variables: EndoVariables) -> Array:
@@ -224,24 +212,34 @@ class Endo(SofteningLaw[EndoVariables]):
         """See `Law`; the tangent is symmetric."""
         alpha = self.damaged(jump, variables) if frozen is None else frozen
         at = self.plastic_return(jump, variables, alpha)
-        tangent = self.stiffness_with(at.compliance)
+        tangent = self.stiffness(at)
         if frozen is None:
-            grows = alpha > variables.alpha
-            b = at.coupling / np.sqrt(np.where(grows, at.decrease * self.energy, np.inf))[:, None]
-            tangent = tangent - b[:, :, None] * b[:, None, :]
-        return self.K * (jump - at.plastic), tangent
+            decrease = np.where(alpha > variables.alpha, at.decrease * self.energy, np.inf)
+            normal, *shear = at.decline
+            b = self.K * np.column_stack([normal, *at.in_plane(*shear)])
+            b /= np.sqrt(decrease)[:, None]
+            tangent -= b[:, :, None] * b[:, None, :]
+        return self.K * (jump - np.column_stack(at.plastic)), tangent
 
-    def stiffness_with(self, compliance: Array) -> Array:
+    def stiffness(self, at: PlasticReturn) -> Array:
         """The tangent (q, 3, 3) of the joint that flows at constant damage."""
-        flow = (1 - self.artificial) * self.K[:, None] * compliance * self.K
-        return np.asarray(np.diag(self.K) - flow)
+        (nn, na, aa, cc), (t_1, t_2) = at.compliance, at.direction
+        flow = np.empty((len(nn), 3, 3))
+        flow[:, 0, 0], along = nn, aa - cc
+        flow[:, 0, 1] = flow[:, 1, 0] = na * t_1
+        flow[:, 0, 2] = flow[:, 2, 0] = na * t_2
+        flow[:, 1, 2] = flow[:, 2, 1] = along * t_1 * t_2
+        flow[:, 1, 1], flow[:, 2, 2] = cc + along * t_1**2, cc + along * t_2**2
+        flow *= (self.artificial - 1) * np.multiply.outer(self.K, self.K)
+        flow += np.diag(self.K)
+        return flow
 
     def secant_stiffness(
         self, jump: Array, variables: EndoVariables, frozen: Array | None = None
     ) -> Array:
         """See `Law`: the tangent at constant damage."""
         alpha = self.damaged(jump, variables) if frozen is None else frozen
-        return self.stiffness_with(self.plastic_return(jump, variables, alpha).compliance)
+        return self.stiffness(self.plastic_return(jump, variables, alpha))
 
     def frozen_damage(self, jump: Array, variables: EndoVariables) -> Array:
         """See `SofteningLaw`."""

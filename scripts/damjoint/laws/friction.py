@@ -114,7 +114,7 @@ class Friction(Law[FrictionVariables]):
         opening = self.opening(jump, variables)
         normal = self.K_N * np.minimum(opening, self.cap_opening)
         shear = self.K_T * (jump[:, 1:] - variables.plastic)
-        size = np.sqrt(shear[:, 0] ** 2 + shear[:, 1] ** 2)
+        size = np.hypot(shear[:, 0], shear[:, 1])
         excess = size + self.mu * normal - self.H * variables.accumulated - self.adhesion
         direction = shear / np.maximum(size, 1e-300)[:, None]
         slips = excess > self.yield_tolerance * size
@@ -131,18 +131,18 @@ class Friction(Law[FrictionVariables]):
         tangent = np.zeros((len(jump), 3, 3))
         tangent[:, 0, 0] = self.normal_stiffness(opened)
         tangent[:, 1, 1] = tangent[:, 2, 2] = self.K_T
-        slides = np.flatnonzero(slip)
-        if not len(slides):
+        slides = slip > 0
+        if not slides.any():
             return traction, tangent
-        n, eye = n[slides], np.eye(2)
-        across = 1 - self.K_T * slip[slides] / np.maximum(size[slides], 1e-300)
-        along = self.H / (self.K_T + self.H)
-        outer = n[:, :, None] * n[:, None, :]
-        tangent[slides, 1:, 1:] = self.K_T * (
-            across[:, None, None] * (eye - outer) + along * outer + self.artificial * eye
-        )
+        across = 1 - self.K_T * slip / np.maximum(size, 1e-300)
+        along = np.where(slides, self.H / (self.K_T + self.H), 1.0)
+        difference = (self.K_T * (along - across))[:, None] * n
+        tangent[:, 1:, 1:] = difference[:, :, None] * n[:, None, :]
+        across = self.K_T * (across + self.artificial * slides)
+        tangent[:, 1, 1] += across
+        tangent[:, 2, 2] += across
         coupling = -self.K_T / (self.K_T + self.H) * self.mu * self.K_N
-        tangent[slides, 1:, 0] = np.where(opened[slides], 0, coupling)[:, None] * n
+        tangent[:, 1:, 0] = (coupling * (slides & ~opened))[:, None] * n
         return traction, tangent
 
     def secant_stiffness(self, jump: Array, variables: FrictionVariables) -> Array:

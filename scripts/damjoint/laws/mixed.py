@@ -38,6 +38,7 @@ class Mixed(SofteningLaw[MixedVariables]):
         self.broken_damage = float(self.curve.damage(np.float64(1)))
         self.K_N, self.K_T, self.K_contact = p["K_N"], p["K_T"], p["pena_contact"] * p["K_N"]
         self.ratio, self.artificial = self.K_T / self.K_N, p["artificial"]
+        self.ratios = np.array([1, self.ratio, self.ratio])
         self.tensile_strength = p["sigma_max"]
         self.delta_e = self.tensile_strength / self.K_N
         #: where linear softening ends; without strength there is none
@@ -63,8 +64,9 @@ class Mixed(SofteningLaw[MixedVariables]):
 
     def equivalent(self, jump: Array) -> Array:
         """The equivalent jump sqrt(<delta_n>^2 + (K_T/K_N) |delta_t|^2) (q,) [m]."""
-        shear = self.ratio * (jump[:, 1:] ** 2).sum(axis=1)
-        return np.asarray(np.sqrt(np.maximum(jump[:, 0], 0) ** 2 + shear))
+        opening, *slip = jump.T
+        shear = self.ratio * (slip[0] ** 2 + slip[1] ** 2)
+        return np.asarray(np.sqrt(np.maximum(opening, 0) ** 2 + shear))
 
     def progress(self, kappa: Array) -> Array:
         """Progress of the softening at the largest equivalent jump (q,) [-]."""
@@ -89,22 +91,22 @@ class Mixed(SofteningLaw[MixedVariables]):
         """See `Law`; the tangent is symmetric."""
         kappa = self.frozen_damage(jump, variables) if frozen is None else frozen
         stiffness, rate = self.secant(kappa)
-        tangent, closed = self.stiffness(jump, stiffness), jump[:, 0] <= 0
-        direction = jump * [1, self.ratio, self.ratio]
-        traction = stiffness[:, None] * direction
-        traction[:, 0] = np.where(closed, self.K_contact * jump[:, 0], traction[:, 0])
+        tangent, opening = self.stiffness(jump, stiffness), jump[:, 0]
+        traction = stiffness[:, None] * (jump * self.ratios)
+        traction[:, 0] = np.where(opening <= 0, self.K_contact, stiffness) * opening
         if frozen is None:
-            direction[:, 0] = np.maximum(direction[:, 0], 0)
+            direction = jump * self.ratios
+            np.maximum(opening, 0, out=direction[:, 0])
             growth = np.where(kappa > variables.kappa, rate / np.maximum(kappa, 1e-300), 0)
-            tangent += growth[:, None, None] * direction[:, :, None] * direction[:, None, :]
+            tangent += (growth[:, None] * direction)[:, :, None] * direction[:, None, :]
         return traction, tangent
 
     def stiffness(self, jump: Array, secant: Array) -> Array:
         """The diagonal stiffness (q, 3, 3) at a constant kappa, at least the artificial one."""
         matrix = np.zeros((len(jump), 3, 3))
-        weak = self.artificial * self.K_N
-        matrix[:, 0, 0] = np.where(jump[:, 0] <= 0, self.K_contact, np.maximum(secant, weak))
-        matrix[:, 1, 1] = matrix[:, 2, 2] = self.ratio * np.maximum(secant, weak)
+        stiffness = np.maximum(secant, self.artificial * self.K_N)
+        matrix[:, 0, 0] = np.where(jump[:, 0] <= 0, self.K_contact, stiffness)
+        matrix[:, 1, 1] = matrix[:, 2, 2] = self.ratio * stiffness
         return matrix
 
     def secant_stiffness(

@@ -119,6 +119,8 @@ class Rupture(SofteningLaw[RuptureVariables]):
 
     def opening(self, jump: Array, variables: RuptureVariables) -> Array:
         """The opening beyond the thickness that grout and saw leave (q,) [m]."""
+        if not (self.grout or self.saw):
+            return jump[:, 0]
         return np.minimum(self.gap(jump, variables), variables.largest)
 
     def is_broken_at(self, opening: Array, variables: RuptureVariables) -> BoolArray:
@@ -131,11 +133,11 @@ class Rupture(SofteningLaw[RuptureVariables]):
 
     def shear_share(self, opening: Array) -> Array:
         """Remaining part of the shear stiffness (q,): 1 to 0."""
-        return np.where(opening <= 0, 1, np.maximum(1 - opening / self.L_CT, 0))
+        return np.minimum(np.maximum(1 - opening / self.L_CT, 0), 1)
 
     def shear_slope(self, opening: Array) -> Array:
         """Derivative of the shear stiffness with the opening (q,) [Pa/m2]."""
-        return np.where((opening > 0) & (opening < self.L_CT), -self.K_T / self.L_CT, 0)
+        return ((opening > 0) & (opening < self.L_CT)) * (-self.K_T / self.L_CT)
 
     def progress(self, kappa: Array) -> Array:
         """Progress of the softening at the largest opening (q,) [-]."""
@@ -169,9 +171,10 @@ class Rupture(SofteningLaw[RuptureVariables]):
         damage open points do not soften.
         """
         v, weak, closed = variables, self.artificial * self.K_N, opening <= 0
-        broken, unloads = self.was_broken(v), np.ones(len(opening), bool)
         if frozen is None:
             broken, unloads = self.is_broken_at(opening, v), opening <= v.kappa
+        else:
+            broken, unloads = self.was_broken(v), np.ones(len(opening), bool)
         with np.errstate(divide="ignore", invalid="ignore"):  # without tensile strength
             unloading = self.softening_stress(v.kappa) / v.kappa
             stress = np.where(unloads, unloading * opening, self.softening_stress(opening))
@@ -184,9 +187,9 @@ class Rupture(SofteningLaw[RuptureVariables]):
 
     def stiffness(self, normal: Array, shear_share: Array) -> Array:
         """The diagonal stiffness (q, 3, 3): normal, and the remaining shear stiffness."""
-        shear = np.maximum(self.K_T * shear_share, self.artificial * self.K_T)
         matrix = np.zeros((len(normal), 3, 3))
-        matrix[:, 0, 0], matrix[:, 1, 1], matrix[:, 2, 2] = normal, shear, shear
+        matrix[:, 0, 0] = normal
+        matrix[:, 1, 1] = matrix[:, 2, 2] = self.K_T * np.maximum(shear_share, self.artificial)
         return matrix
 
     def traction_and_tangent(
@@ -197,9 +200,11 @@ class Rupture(SofteningLaw[RuptureVariables]):
         normal, slope = self.normal_response(opening, variables, frozen)
         share = self.shear_share(opening) if frozen is None else frozen
         tangent = self.stiffness(slope, share)
-        if frozen is None:
+        if frozen is None and self.releases_shear:
             tangent[:, 1:, 0] = self.shear_slope(opening)[:, None] * slip
-        return np.column_stack([normal, (self.K_T * share)[:, None] * slip]), tangent
+        traction = np.empty((len(jump), 3))
+        traction[:, 0], traction[:, 1:] = normal, (self.K_T * share)[:, None] * slip
+        return traction, tangent
 
     def secant_stiffness(
         self, jump: Array, variables: RuptureVariables, frozen: Array | None = None
@@ -217,7 +222,7 @@ class Rupture(SofteningLaw[RuptureVariables]):
     def release_side(self, jump: Array, variables: RuptureVariables) -> NDArray[np.int_]:
         """See `Law`."""
         opening = self.opening(jump, variables)
-        return np.select([opening <= 0, opening < self.L_CT], [-1, 0], 1)
+        return np.asarray(opening > 0, int) + (opening >= self.L_CT) - 1
 
     def shear_release(self, jump: Array, variables: RuptureVariables) -> tuple[Array, Array]:
         """See `Law`."""

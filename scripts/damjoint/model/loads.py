@@ -56,7 +56,7 @@ class Unknown:
     def at(self, loading: Loading, value: float) -> Loading:
         """A loading with another value of it."""
         if self.load == "level":
-            return replace(loading, level=value)
+            return Loading(value, loading.tail, loading.grown)
         parts = dict(zip(STAGED, loading.grown, strict=True)) | {self.load: value}
         return replace(loading, grown=tuple(parts.values()))
 
@@ -249,8 +249,6 @@ class AddedPressure:
 
     def height(self, level: float, y: Array, tilt: Array) -> Array:
         """Heights of pressure at heights y [m] where the normal has the horizontal part tilt."""
-        if not self.size:
-            return np.zeros_like(y)
         depth = np.maximum(level - self.floor, 0)
         if not self.zangar:
             return self.size * tilt * np.sqrt(depth * np.maximum(level - y, 0))

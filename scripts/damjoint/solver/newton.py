@@ -169,7 +169,8 @@ def stop_reason(now: Iterate, sizes: list[float], strategy: Strategy) -> str:
         repeats(now.size, [size], STAGNATION) for size in sizes[-STAGNATING_ITERATIONS:]
     ):
         return "the residual stagnates at {:.2g} of the loads"
-    since = len(sizes) - int(np.argmin([*sizes, now.size]))
+    all_sizes = [*sizes, now.size]
+    since = len(sizes) - all_sizes.index(min(all_sizes))
     if since >= strategy.patience:
         return f"{since} iterations have not reduced the residual, {{:.2g}} of the loads"
     if len(sizes) == strategy.iterations:
