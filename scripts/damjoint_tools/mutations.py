@@ -146,8 +146,8 @@ MUTATIONS = (
     Mutation(
         "square law for the cubic law of flow",
         "joint/water.py",
-        "w.scale * at[0] ** 3 * w.joint.points.weights",
-        "w.scale * at[0] ** 2 * w.joint.points.weights",
+        "w.scale * (1 + at[0]) ** 3 * w.joint.points.weights",
+        "w.scale * (1 + at[0]) ** 2 * w.joint.points.weights",
         having("uplift", "flow"),
     ),
     Mutation(
@@ -174,8 +174,8 @@ MUTATIONS = (
     Mutation(
         "fade of the drains beside a crack x 0.9",
         "joint/water.py",
-        "remaining = 1 - float(beside @ (factor - 1)) / most",
-        "remaining = 1 - 0.9 * float(beside @ (factor - 1)) / most",
+        "remaining = 1 - float(beside @ wider) / most",
+        "remaining = 1 - 0.9 * float(beside @ wider) / most",
         both(having("uplift", "cracked"), having("drains", 1)),
     ),
     Mutation(
@@ -188,8 +188,8 @@ MUTATIONS = (
     Mutation(
         "voids lose their water",
         "joint/flow_in_time.py",
-        "volume=self.volume + self.storage * pressure - void,",
-        "volume=self.volume + self.storage * pressure,",
+        "beyond=self.opened + self.storage * pressure - void,",
+        "beyond=self.opened + self.storage * pressure,",
         having("time_unit"),
     ),
     Mutation(

@@ -106,6 +106,19 @@ def test_squeeze_film_with_a_sealed_tip(blocks, gap):
     assert force == pytest.approx(4 * VISC * speed * L**3 / width**3, rel=5e-3)  # elements of 1 m
 
 
+def test_a_film_follows_openings_far_below_its_aperture(blocks):
+    """The same film of 10 um that closes by 1e-19 m: 6 Pa. The volume is known to its openings'
+    last digit, 1e-25 m, not to that of the aperture, 2e-21 m.
+    """
+    model = blocks(("flow", "none", "none"), aperture_min=1e-5)
+    gap, closing, seconds, L = 3e-9, 1e-19, 1e-5, 10.0
+    slot = Slot(model, opened(model, [gap, 0, 0]))
+    pressure = slot.step(opened(model, [gap - closing, 0, 0]), seconds)
+    width = 1e-5 + gap
+    expected = 6 * VISC * closing / seconds * (L**2 - (L - slot.x) ** 2) / width**3
+    assert pressure == pytest.approx(expected, rel=1e-4, abs=1e-4 * expected.max())
+
+
 @pytest.mark.heavy
 def test_slot_that_stores_water():
     """p0 erfc(x / (2 sqrt(D t))), D = w^3 N / (12 eta), after a sudden rise at the mouth."""
@@ -471,7 +484,7 @@ def test_a_fracture_that_its_pressure_widens():
         for _ in range(3):  # the conductivity follows the pressure
             wider = (1 + fields.at_points @ pressure / stiffness / width) ** 3
             conductivity = system.reference * wider * system.flow.points.weights
-            widths = [water.aperture(closed, None)[0] for water in system.members]
+            widths = [water.widening(closed, None)[0] for water in system.members]
             solution = system.flow_in_time(step, widths, heads, heads, none.astype(int), none)(
                 conductivity
             )

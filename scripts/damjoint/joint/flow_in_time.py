@@ -41,17 +41,27 @@ LAST_BIT = 2.0**-53
 
 @dataclass(frozen=True, kw_only=True)
 class StoredWater:
-    """The water in joints that exchange it, at their nodes (n,) [m3; 2D: per metre]: stored; voids
-    beside it; what has come in by ends and drains so far. time: t of this state; begin: that from
-    which the step has led to here. parts: this is their mean, see `FlowInTime`.
+    """The water in joints that exchange it, at their nodes (n,) [m3; 2D: per metre]: volume of the
+    closed joints, and what is stored beyond it; voids beside it; what has come in by ends and
+    drains so far. time: t of this state; begin: that from which the step has led to here. parts:
+    this is their mean, see `FlowInTime`.
+
+    Two numbers: by the last digit of their sum a film without storage changes its pressure by more
+    than an equilibrium may.
     """
 
     time: float
-    volume: Array
+    closed: Array
+    beyond: Array
     void: Array
     inflow: Array
     begin: StoredWater | None = None
     parts: tuple[StoredWater, ...] = ()
+
+    @property
+    def volume(self) -> Array:
+        """All that is stored."""
+        return self.closed + self.beyond
 
     def after(self, begin: StoredWater) -> StoredWater:
         """This state, as the end of a step from another one."""
@@ -80,14 +90,15 @@ class TimeStep:
 
 @dataclass(frozen=True, kw_only=True)
 class FlowInTime(FlowSolution):
-    """A solution at the end of a time step, with the water at the nodes: stored, voids, inflow in
-    the step, as in `StoredWater`. at_ends: pressure beyond the imposed one at the ends [Pa]: a dry
-    one may be higher than the imposed head. parts: with drains of part effect, the solutions
-    without drains and with full effect, of which this is the mean; each stores water of its own.
+    """A solution at the end of a time step, with the water at the nodes: stored beyond the volume
+    of the closed joints, voids, inflow in the step, as in `StoredWater`. at_ends: pressure beyond
+    the imposed one at the ends [Pa]: a dry one may be higher than the imposed head. parts: with
+    drains of part effect, the solutions without drains and with full effect, of which this is the
+    mean; each stores water of its own.
     """
 
     at_ends: Array
-    volume: Array
+    beyond: Array
     void: Array
     inflow: Array
     parts: tuple[FlowInTime, ...] = ()
@@ -100,7 +111,7 @@ class FlowInTime(FlowSolution):
             pressure=mean.pressure,
             systems=mean.systems,
             at_ends=self.at_ends,
-            volume=rest * self.volume + share * other.volume,
+            beyond=rest * self.beyond + share * other.beyond,
             void=rest * self.void + share * other.void,
             inflow=rest * self.inflow + share * other.inflow,
         )
@@ -113,7 +124,14 @@ class FlowInTime(FlowSolution):
             replace(part.stored(time, own), begin=None)
             for part, own in zip(self.parts, begins, strict=False)
         )
-        end = StoredWater(time=time, volume=self.volume, void=self.void, inflow=inflow, parts=parts)
+        end = StoredWater(
+            time=time,
+            closed=begin.closed,
+            beyond=self.beyond,
+            void=self.void,
+            inflow=inflow,
+            parts=parts,
+        )
         return end.after(begin)
 
 
@@ -123,8 +141,8 @@ class WaterBalance:
 
     flow: Flow
     step: TimeStep
-    #: volume of the joint that each node stands for, and what it stores [m3/Pa]
-    volume: Array
+    #: volume beyond that of the closed joint that each node stands for, and what it stores [m3/Pa]
+    opened: Array
     storage: Array
     #: height times the water's weight [Pa]; pressure of cavitation [Pa]
     elevation: Array
@@ -138,20 +156,20 @@ class WaterBalance:
         known: BoolArray,
         dry: BoolArray,
         guess: BoolArray,
-        beyond: Array | None = None,
+        beside: Array | None = None,
     ) -> FlowInTime:
         """Solve for conductivities w^3/(12 visc) times weights (q,), and heads times the water's
         weight (n,) [Pa] where they are known; imposed: as in `Flow.solve`; dry: ends of these;
-        guess: where the search for voids begins (n,); beyond: what flows out of the nodes beside
+        guess: where the search for voids begins (n,); beside: what flows out of the nodes beside
         the flow of these conductivities (n,) [m3/s], None: nothing.
 
         nan if no set of nodes with voids is found.
         """
         seconds, begin = self.step.seconds, self.step.begin
-        ground, before = self.storage / seconds, begin.volume
-        rest = before - self.volume + self.storage * self.elevation
-        if beyond is not None:
-            rest = rest - seconds * beyond
+        ground, before = self.storage / seconds, begin.beyond
+        rest = before - self.opened + self.storage * self.elevation
+        if beside is not None:
+            rest = rest - seconds * beside
         voids, air = guess & ~known, guess & dry
         lacking = np.zeros(len(heads))
         for sets in range(MOST_SETS):
@@ -161,18 +179,19 @@ class WaterBalance:
             except (np.linalg.LinAlgError, ValueError):
                 break
             if sets < FREE_SETS:
-                most = np.maximum(before, 0) / seconds
+                most = np.maximum(begin.volume, 0) / seconds
                 lacking = system.lacking(voids | air, most, self.elevation)
             source = rest / seconds + lacking
             total = system.solve(source, given)
             pressure = total - self.elevation
-            excess = self.volume + self.storage * pressure - before
+            excess = self.opened + self.storage * pressure - before
             excess += seconds * (system.outflow(total, source) - lacking)
-            if beyond is not None:
-                excess += seconds * beyond
+            if beside is not None:
+                excess += seconds * beside
             largest = np.abs(total).max()
             suction = pressure < self.lowest - ROUNDING * largest
-            least = self.volume + np.abs(before) + seconds * system.diagonal * largest
+            least = begin.closed + self.opened + np.abs(begin.volume)
+            least += seconds * system.diagonal * largest
             empties, fills = suction & ~voids & ~known, voids & (excess < -ROUNDING * least)
             drawn = dry & (excess > ROUNDING * least * np.where(air, -1, 1))
             stays = sets >= FREE_SETS or np.array_equal(air, drawn)
@@ -191,7 +210,7 @@ class WaterBalance:
                         )
                     ],
                     at_ends=(total - imposed)[self.flow.fields.ends],
-                    volume=self.volume + self.storage * pressure - void,
+                    beyond=self.opened + self.storage * pressure - void,
                     void=void,
                     inflow=inflow,
                 )
@@ -201,7 +220,7 @@ class WaterBalance:
             pressure=nothing[self.flow.inside],
             systems=[],
             at_ends=nothing[self.flow.fields.ends],
-            volume=nothing,
+            beyond=nothing,
             void=nothing,
             inflow=nothing,
         )
@@ -459,8 +478,11 @@ class OnSurface:
         return solution[self.flow.inside]
 
 
-def stored_at_rest(volume: Array, storage: Array, pressure: Array, time: float) -> StoredWater:
-    """Full joints of these volumes under a pressure (n,) [Pa], from where inflow counts."""
-    nothing = np.zeros(len(volume))
-    full = volume + storage * pressure
-    return StoredWater(time=time, volume=full, void=nothing, inflow=nothing)
+def stored_at_rest(
+    closed: Array, opened: Array, storage: Array, pressure: Array, time: float
+) -> StoredWater:
+    """Full joints of these volumes, closed and beyond, under a pressure (n,) [Pa], from where
+    inflow counts.
+    """
+    nothing, full = np.zeros(len(closed)), opened + storage * pressure
+    return StoredWater(time=time, closed=closed, beyond=full, void=nothing, inflow=nothing)

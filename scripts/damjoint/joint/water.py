@@ -59,8 +59,8 @@ class Drainage:
 class Apertures:
     """The apertures of the joints of a `WaterSystem`, one array for each."""
 
-    #: over that of the closed joint, and its derivative with the opening, see `JointWater.aperture`
-    factors: list[Array]
+    #: beyond that of the closed joint, and its derivative with the opening: `JointWater.widening`
+    wider: list[Array]
     growth: list[Array]
     #: of all joints, over that of the closed first one, times weights of the points (q,)
     conductivity: Array
@@ -210,16 +210,17 @@ class JointWater:
         flow = self.case["uplift"] == "flow"
         return self.case["aperture_min"] if flow else self.case.shared["crack_aperture"][0]
 
-    def aperture(self, jump: Array, variables: Any) -> tuple[Array, Array]:
-        """Aperture at the law's points over that of the closed joint, and its derivative with the
-        opening.
+    def widening(self, jump: Array, variables: Any) -> tuple[Array, Array]:
+        """Aperture at the law's points beyond that of the closed joint, over this, and its
+        derivative with the opening.
 
         flow: cubic law, of the opening beyond that at which closing stress has narrowed the joint
         to `aperture_min`. cracked: the same, but of the opening beyond that of a crack, and bounded
         where an open point has practically the full head. Others: closed, whatever the opening.
         """
         if not flows(self.case):
-            return np.ones(len(self.joint.points.weights)), np.zeros(len(self.joint.points.weights))
+            nothing = np.zeros(len(self.joint.points.weights))
+            return nothing, nothing
         opening = self.joint.flow.opening @ jump
         narrowest, most = self.narrowest, np.inf
         if self.case["uplift"] != "flow":
@@ -228,20 +229,19 @@ class JointWater:
         elif self.case["aperture_elastic"]:
             opening = opening + self.case["aperture_elastic"]
         wider = np.maximum(opening, 0) / narrowest
-        factor = 1 + np.minimum(wider, most)
         growing = (wider > 0) & (wider < most)
-        return factor, np.where(growing, 1 / narrowest, 0)
+        return np.minimum(wider, most), np.where(growing, 1 / narrowest, 0)
 
     def conductivity(self, jump: Array, variables: Any) -> tuple[Array, Array]:
         """Conductivity at the law's points over that of the closed joint, and its derivative with
-        the opening, by the `aperture`.
+        the opening.
         """
-        factor, growth = self.aperture(jump, variables)
-        return factor**3, self.growing(factor, growth)
+        wider, growth = self.widening(jump, variables)
+        return (1 + wider) ** 3, self.growing(wider, growth)
 
-    def growing(self, factor: Array, growth: Array) -> Array:
-        """Derivative of the `conductivity` with the opening, by the `aperture`."""
-        return np.where(growth > 0, 3 / self.narrowest * factor**2, 0)
+    def growing(self, wider: Array, growth: Array) -> Array:
+        """Derivative of the `conductivity` with the opening, by the `widening`."""
+        return np.where(growth > 0, 3 / self.narrowest * (1 + wider) ** 2, 0)
 
     def outlets(self, loading: Loading) -> tuple[IntArray, Array]:
         """Nodes of the drains of flowing water, by their numbers in `system`, and heads of their
@@ -253,8 +253,8 @@ class JointWater:
         outlet = np.maximum(height, max(self.case["drain_level"], loading.tail))
         return self.nodes[nodes], outlet
 
-    def drainage(self, factor: Array, growth: Array) -> Drainage:
-        """What a crack leaves of the effect of the drains, by the `aperture`: the part of the
+    def drainage(self, wider: Array, growth: Array) -> Drainage:
+        """What a crack leaves of the effect of the drains, by the `widening`: the part of the
         elements beside them that has not opened to the water.
         """
         assert self.drains
@@ -262,7 +262,7 @@ class JointWater:
         if self.case["uplift"] != "cracked":
             return Drainage(water=self, remaining=1.0, rate=np.zeros(len(beside)))
         most = self.case.shared["crack_most"][0]
-        remaining = 1 - float(beside @ (factor - 1)) / most
+        remaining = 1 - float(beside @ wider) / most
         if remaining < ROUND_OFF:
             return Drainage(water=self, remaining=0.0, rate=np.zeros(len(beside)))
         return Drainage(water=self, remaining=remaining, rate=-beside * growth / most)
@@ -496,7 +496,7 @@ class WaterSystem:
     ) -> FlowSolution:
         at = self.apertures(jump, variables, before_quake)
         conductivity, acting = at.conductivity, at.acting
-        flow = FlowAtLoading(self, at.factors, loading)
+        flow = FlowAtLoading(self, at.wider, loading)
         if effect is None:
             effect = self.drain_effectiveness
         without, fully = step.of_parts if step and 0 < effect < 1 else (step, step)
@@ -526,11 +526,11 @@ class WaterSystem:
             at, of, apertures = self.last_apertures
             if all(map(operator.is_, of, given)) and np.array_equal(at, jump):
                 return apertures
-        members = [(w, w.aperture(*w.opened(jump, *given))) for w in self.members]
-        conductivities = [w.scale * at[0] ** 3 * w.joint.points.weights for w, at in members]
+        members = [(w, w.widening(*w.opened(jump, *given))) for w in self.members]
+        conductivities = [w.scale * (1 + at[0]) ** 3 * w.joint.points.weights for w, at in members]
         drains = [water.drainage(*at) for water, at in members if water.drains]
         apertures = Apertures(
-            factors=[factor for _, (factor, _) in members],
+            wider=[wider for _, (wider, _) in members],
             growth=[growth for _, (_, growth) in members],
             conductivity=np.concatenate(conductivities),
             acting=[line for line in drains if line.remaining],
@@ -580,7 +580,7 @@ class WaterSystem:
     def flow_in_time(
         self,
         step: TimeStep,
-        factors: list[Array],
+        wider: list[Array],
         imposed: Array,
         at_ends: Array,
         drains: IntArray,
@@ -588,7 +588,7 @@ class WaterSystem:
     ) -> Callable[..., FlowInTime]:
         """As `Flow.solve` at the end of a time step, see flow_in_time.py, as a function of
         w^3/(12 visc) times weights (q,) and, in 2D, of a flux beside it as in `Flow.outflow_of`;
-        factors: see `volume_by`. The pressure at a dry end is 0.
+        wider: see `opened_by`. The pressure at a dry end is 0.
         """
         ends, elevation = self.fields.ends, self.elevation
         heads, (known, dry) = at_ends.copy(), np.zeros((2, len(at_ends)), bool)
@@ -600,7 +600,7 @@ class WaterSystem:
         balance = WaterBalance(
             flow=self.flow,
             step=step,
-            volume=self.volume_by(factors),
+            opened=self.opened_by(wider),
             storage=self.storage,
             elevation=elevation,
             lowest=self.members[0].case["pressure_min"],
@@ -659,13 +659,21 @@ class WaterSystem:
 
     def volume(self, jump: Array) -> Array:
         """Volume of the joint that each node stands for (n,) [m3; 2D: per metre]."""
-        return self.volume_by([water.aperture(jump, None)[0] for water in self.members])
+        return self.closed + self.opened_at(jump)
 
-    def volume_by(self, factors: list[Array]) -> Array:
-        """The same by the apertures of each joint over that of the closed one, see `aperture`."""
+    def opened_at(self, jump: Array) -> Array:
+        """See `opened_by`."""
+        return self.opened_by([water.widening(jump, None)[0] for water in self.members])
+
+    @cached_property
+    def closed(self) -> Array:
+        """The same of the closed joint."""
+        return self.opened_by([np.ones(len(w.joint.points.weights)) for w in self.members])
+
+    def opened_by(self, wider: list[Array]) -> Array:
+        """The same beyond that of the closed joint, by the `widening` of each joint."""
         apertures = [
-            water.case["aperture_min"] * factor
-            for water, factor in zip(self.members, factors, strict=True)
+            water.case["aperture_min"] * one for water, one in zip(self.members, wider, strict=True)
         ]
         flow = self.flow
         return np.asarray(
@@ -676,19 +684,19 @@ class WaterSystem:
         self, jump: Array, variables: JointVariables, loading: Loading, time: float
     ) -> StoredWater:
         """What is stored by steady flow at a jump, at a time; suction stores nothing."""
-        imposed, volume = self.unit_weight * self.heads(loading), self.volume(jump)
+        imposed, opened = self.unit_weight * self.heads(loading), self.opened_at(jump)
 
         def by(effect: float) -> StoredWater:
             solution = self.solve(jump, variables, loading, effect=effect)
             pressure = np.maximum(imposed + self.expand_to_nodes(solution) - self.elevation, 0)
-            return stored_at_rest(volume, self.storage, pressure, time)
+            return stored_at_rest(self.closed, opened, self.storage, pressure, time)
 
         effect = self.drain_effectiveness
         if not 0 < effect < 1:
             return by(effect)
         free, drained = by(0.0), by(1.0)
-        mean = (1 - effect) * free.volume + effect * drained.volume
-        return replace(free, volume=mean, parts=(free, drained))
+        mean = (1 - effect) * free.beyond + effect * drained.beyond
+        return replace(free, beyond=mean, parts=(free, drained))
 
     def gradients(self, solution: FlowSolution, water: JointWater) -> list[Array]:
         """Gradient of the total head times the water's weight at the Gauss points of one of the
@@ -725,7 +733,7 @@ class WaterSystem:
         rates = [
             (0 if unchanged else water.scale) * water.growing(*one) * water.joint.points.weights
             for water, one, unchanged in zip(
-                self.members, zip(at.factors, at.growth, strict=True), frozen, strict=True
+                self.members, zip(at.wider, at.growth, strict=True), frozen, strict=True
             )
         ]
         if step is None:
@@ -745,9 +753,9 @@ NO_DRAINS = NO_NODES, np.zeros(0)
 class FlowAtLoading:
     """The flow of the water of a system under a loading, at given apertures."""
 
-    def __init__(self, system: WaterSystem, factors: list[Array], loading: Loading) -> None:
-        """factors: see `WaterSystem.volume_by`."""
-        self.system, self.factors, self.exits = system, factors, NO_NODES
+    def __init__(self, system: WaterSystem, wider: list[Array], loading: Loading) -> None:
+        """wider: see `WaterSystem.opened_by`."""
+        self.system, self.wider, self.exits = system, wider, NO_NODES
         self.head, weight = system.heads(loading), system.unit_weight
         self.imposed = self.at_ends = weight * self.head
         if system.branched:
@@ -762,7 +770,7 @@ class FlowAtLoading:
         """
         system, drained = self.system, self.system.unit_weight * outlet
         in_time = (
-            system.flow_in_time(step, self.factors, self.imposed, self.at_ends, nodes, drained)
+            system.flow_in_time(step, self.wider, self.imposed, self.at_ends, nodes, drained)
             if step
             else None
         )

@@ -218,7 +218,7 @@ class Splitting:
         self.fields = flow.fields.at_points
         self.storage = self.fields.T @ (test.storage * s.points.weights)
         nothing = np.zeros(flow.fields.nodes)
-        self.stored = stored_at_rest(nothing, self.storage, nothing, 0.0)
+        self.stored = stored_at_rest(nothing, nothing, self.storage, nothing, 0.0)
         self.heads = np.where(s.held, HELD, 0.0)
         self.known = s.held.copy()
         self.known[flow.fields.ends] = True
@@ -242,7 +242,7 @@ class Splitting:
         balance = WaterBalance(
             flow=flow,
             step=TimeStep(seconds=test.dt, begin=self.stored),
-            volume=self.fields.T @ (weights * opening),
+            opened=self.fields.T @ (weights * opening),
             storage=self.storage,
             elevation=np.zeros(len(self.heads)),
             lowest=-np.inf,
