@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.optimize import bisect
+from scipy.optimize import brentq
 
 from .. import InputError
 from ..input.case import Case
@@ -44,6 +44,8 @@ class GravityValues:
     #: the case with a value, and that of each of its joints; raise InputError
     case_at: Callable[[float], Case]
     joints_at: Callable[[float], Sequence[Case]]
+    #: the `rigid_blocks` so far, by value and tension: assumptions share most of them
+    known: dict[tuple[float, bool], list[gravity.GravityMethod]] = field(default_factory=dict)
 
     def beside(self, result: CriticalValue, points: Sequence[Point]) -> CriticalValue:
         """A result with the values of the gravity method, and a note on them."""
@@ -105,7 +107,7 @@ class GravityValues:
             return ""
         pairs = (self.rigid_blocks(level * (1 + side * PRECISION)) for side in (-1, 1))
         for k, (below, method) in enumerate(zip(*pairs, strict=True)):
-            if block_stands(method, False):
+            if reserve(method, False) >= 0:
                 continue
             crack = above[0].last[column_of("crack_length", k)]
             if method.crack_length - crack <= LONGER * method.body.length:
@@ -138,7 +140,7 @@ class GravityValues:
         """
         for beyond in (value * (1 + PRECISION), value * (1 - PRECISION)):
             methods = self.rigid_blocks(beyond, tension)
-            failing = [k for k, m in enumerate(methods) if not block_stands(m, longest)]
+            failing = [k for k, m in enumerate(methods) if reserve(m, longest) < 0]
             if failing:
                 return self.case.named(failing)
         return ""
@@ -157,24 +159,26 @@ class GravityValues:
         cracks in equilibrium decides; joint: the number of the only joint that is considered.
         """
 
-        def stands(value: float) -> bool | None:
-            return self.stands(value, tension, longest, joint)
+        def reserve(value: float) -> float:
+            return self.reserve(value, tension, longest, joint)
 
-        at_value = stands(value)
+        here = reserve(value)
         for share in DISTANCES:
             for other in (value * (1 + share), value * (1 - share)):
-                at_other = stands(other)
-                if at_other is not None and at_other != at_value:
-                    sign: Callable[[float], float] = lambda v: (
-                        1.0 if stands(v) == at_value else -1.0
-                    )
-                    return float(bisect(sign, value, other, rtol=PRECISION / 1000))
+                there = reserve(other)
+                if np.isfinite([here, there]).all() and (here < 0) != (there < 0):
+                    return float(brentq(reserve, value, other, rtol=PRECISION / 1000))
         return None
 
     def rigid_blocks(self, value: float, tension: bool = True) -> list[gravity.GravityMethod]:
         """The gravity method with a value, joint by joint; empty if the case allows no such value,
         or its geometry no gravity method.
         """
+        if (value, tension) not in self.known:
+            self.known[value, tension] = self._rigid_blocks(value, tension)
+        return self.known[value, tension]
+
+    def _rigid_blocks(self, value: float, tension: bool) -> list[gravity.GravityMethod]:
         if self.case.geometry:
             return []
         try:
@@ -184,25 +188,37 @@ class GravityValues:
         level = value if self.of == "level" else None
         return [gravity.at(joint, joint.times[-1], level, tension) for joint in joints]
 
-    def stands(
+    def stands(self, value: float) -> bool | None:
+        """Whether all joints have a `reserve`; None if there is no gravity method."""
+        least = self.reserve(value)
+        return None if np.isnan(least) else least >= 0
+
+    def reserve(
         self,
         value: float,
         tension: bool = True,
         longest: bool = False,
         joint: int | None = None,
-    ) -> bool | None:
-        """Whether the gravity method finds an equilibrium of all joints, or of one by its number,
-        with friction if the law has it, and toes that are not crushed; None if there is no gravity
+    ) -> float:
+        """The least `reserve` of all joints, or of one by its number; nan if there is no gravity
         method.
         """
         methods = self.rigid_blocks(value, tension)
         methods = methods if joint is None else methods[joint : joint + 1]
-        return all(block_stands(method, longest) for method in methods) if methods else None
+        return min((reserve(method, longest) for method in methods), default=np.nan)
 
 
-def block_stands(method: gravity.GravityMethod, longest: bool) -> bool:
-    """Whether a rigid block stands; longest: with the longest of several cracks in equilibrium."""
+def reserve(method: gravity.GravityMethod, longest: bool) -> float:
+    """What a rigid block has left until it slides, if its law has friction, or its toe is crushed,
+    over its resistance, below 0 beyond that, -1 if it overturns [-]; longest: with the longest of
+    several cracks in equilibrium.
+    """
     case, method = method.case, (method, *method.further)[-1] if longest else method
-    slides = case.law.has_friction and method.SSF < 1
-    crushed = 0 < case["f_c"] < -method.sigma_n_toe
-    return method.stands and not slides and not crushed
+    if not method.stands:
+        return -1.0
+    left = [1.0]
+    if case.law.has_friction:
+        left.append(1 - 1 / method.SSF if method.SSF > 0 else -1.0)
+    if case["f_c"] > 0:
+        left.append(1 + method.sigma_n_toe / case["f_c"])
+    return min(left)
