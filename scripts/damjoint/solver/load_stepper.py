@@ -35,7 +35,7 @@ GROWS = 0.02
 SAME_DAMAGE = 0.02
 
 #: Number of strategies by which a step from the equilibrium path to the prescribed level is tried.
-FROM_PATH = 3
+FROM_PATH = 2
 
 
 @dataclass(frozen=True)
@@ -414,12 +414,13 @@ class LoadStepper:
         """A step over unstable crack growth, after which there is no equilibrium near the last one.
 
         Along the equilibrium path, unless opening releases the shear stiffness: such a path has a
-        kink and a turn at every point. Else, and where the path is lost, by relaxation.
+        kink and a turn at every point. Else, and where the path is lost, by relaxation. No branch
+        leads to other loads that act at once: their step is cut first.
         """
         equilibrium, step = self.model.equilibrium, None
         laws = equilibrium.laws
         follows = not (laws.releases_shear or self.drives or self.path_ended)
-        if follows and (smallest or not cuts):
+        if follows and (smallest or (not cuts and self.only_level_changes(time))):
             step = self.along_path(time)
             if self.path_ended and not smallest:  # shorter steps from where the path has ended
                 return None
@@ -448,7 +449,7 @@ class LoadStepper:
         self.path_begin = begin
         origin = start = Point(self.model, begin, self.history.copy())
         path = self.path_from(start, time)
-        same = self.same_but_for_level(self.model.loading(time, level), begin.loading)
+        same = self.only_level_changes(time)
         if same:
             path.advance()
         else:  # no branch: the other loads change at once
@@ -554,6 +555,11 @@ class LoadStepper:
         falls = np.flatnonzero(np.diff(levels) < 0)
         if len(falls):
             self.limit_points += ((float(levels[falls[0]]), float(min(levels[falls[0] :]))),)
+
+    def only_level_changes(self, time: float) -> bool:
+        """Whether nothing but the level changes from the last state to a time."""
+        loading = self.model.loading(time, self.case.level_at(time))
+        return self.same_but_for_level(loading, self.state.loading)
 
     def same_but_for_level(self, one: Loading, other: Loading) -> bool:
         """Whether two loadings differ in nothing else that acts."""

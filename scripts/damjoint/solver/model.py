@@ -211,7 +211,7 @@ class Model:
         parts = ("growth", "secant", "release", "iterations")
         table = zip(*(self.case.shared[f"strategy_{n}"] for n in parts), strict=True)
         halvings = int(self.case["max_halvings"])
-        most = 2 if self.equilibrium.laws.releases_shear else 1
+        most = 2 if self.equilibrium.laws.releases_shear else 0
         return tuple(
             Strategy(
                 growth,
