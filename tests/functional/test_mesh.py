@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from damjoint.input.parameters import start_gmsh
 from damjoint.input.resolve import load
 from damjoint.mesh import mesh
+from damjoint.mesh.generate import generate
+from damjoint.verification.wedge_tests import Groups
 
 # Bulk and joint elements, from the table of the verification document.
 PUBLISHED = {
@@ -104,3 +107,11 @@ def test_a_joint_lies_between_its_bodies(settings):
     x = joint.surface.points[:, 0]
     assert np.allclose(x[joint.heel_nodes], x.min()) and np.allclose(x[joint.toe_nodes], x.max())
     assert {face.body for face in found.faces.values()} == set(found.solids)
+
+
+def test_options_that_a_geometry_sets_do_not_reach_the_next_mesh():
+    """The section of a dam without a pattern takes no sizes from points; that of a wedge does."""
+    first = len(Groups(10.0).points)
+    start_gmsh().option.setNumber("Mesh.MeshSizeFactor", 3)
+    generate(load("dam", {"mesh_pattern": "free", "n_joint": 4}))
+    assert len(Groups(10.0).points) == first

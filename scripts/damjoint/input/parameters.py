@@ -74,7 +74,23 @@ def start_gmsh() -> ModuleType:
         if threading.current_thread() is threading.main_thread():
             for number, handler in handlers.items():  # Gmsh has reset them to the system's
                 signal.signal(number, handler)
-        gmsh.option.setNumber("General.Verbosity", 0)  # errors are raised instead
+        quiet(gmsh)
+    return gmsh
+
+
+def quiet(gmsh: ModuleType) -> None:
+    """Let Gmsh print nothing: its errors are raised."""
+    gmsh.option.setNumber("General.Verbosity", 0)
+
+
+def empty_gmsh() -> ModuleType:
+    """Gmsh without a model and with its own options: those that an earlier geometry in this process
+    has set would change the next mesh.
+    """
+    gmsh = start_gmsh()
+    gmsh.clear()
+    gmsh.option.restoreDefaults()
+    quiet(gmsh)
     return gmsh
 
 

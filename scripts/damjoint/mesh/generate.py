@@ -13,9 +13,9 @@ from ..input.parameters import (
     AUTOMATIC,
     assignments,
     declared,
+    empty_gmsh,
     interruptible,
     listing,
-    start_gmsh,
 )
 from ..input.values import has_drains, has_point
 
@@ -87,19 +87,12 @@ def divided(case: Case) -> dict[str, Setting]:
     return result
 
 
-#: Options of Gmsh by which geo/dam2d.geo chooses where element sizes come from; 1: the default.
-SIZE_OPTIONS = ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints")
-
-
 def generate(case: Case) -> None:
     """Make the mesh of a case, as Gmsh's current mesh.
 
     Raises RunError, and InputError if a user's own geometry can not be read.
     """
-    gmsh, geometry = start_gmsh(), case.geometry
-    gmsh.clear()
-    for option in SIZE_OPTIONS:  # of an earlier geometry in this process
-        gmsh.option.setNumber(f"Mesh.{option}", 1)
+    gmsh, geometry = empty_gmsh(), case.geometry
     # a .geo file of a user may take sizes from the case
     large = not geometry and case["dam_height"] >= THOUSAND
     settings = (

@@ -23,7 +23,7 @@ from ..fem import elements
 from ..fem.elasticity import elasticity
 from ..fem.factor import schur_complement
 from ..input.geometry_file import opened
-from ..input.parameters import start_gmsh
+from ..input.parameters import empty_gmsh, start_gmsh
 from ..input.resolve import NO_DAM, load
 from ..joint.flow import Flow, JointFields
 from ..joint.flow_in_time import FlowInTime, TimeStep, WaterBalance, stored_at_rest
@@ -94,8 +94,7 @@ class Groups:
 
     def __init__(self, size: float) -> None:
         """size: of the elements along the crack [mm]."""
-        gmsh = start_gmsh()
-        gmsh.clear()
+        gmsh = empty_gmsh()
         with opened(data("geo") / "wedge.geo", f"size_path = {size};\n"):
             gmsh.model.mesh.generate(2)
         tags, points, _ = gmsh.model.mesh.getNodes()
