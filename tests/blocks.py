@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from damjoint.input.parameters import start_gmsh
-from damjoint.mesh.generate import SIZE_OPTIONS
+from damjoint.input.parameters import empty_gmsh
 
 #: Corners (x0, y0, x1, y1) of the rock [m].
 ROCK = -20.0, -20.0, 40.0, 0.0
@@ -26,10 +25,7 @@ def write_blocks(
     the rock, downstream. A joint whose name begins with _ is a line of the mesh, but glued. size:
     of the elements [m]; fine: of those at joints, by name; crest: its x, by default the leftmost.
     """
-    gmsh = start_gmsh()
-    gmsh.clear()
-    for option in SIZE_OPTIONS:  # of an earlier geometry in this process
-        gmsh.option.setNumber(f"Mesh.{option}", 1)
+    gmsh = empty_gmsh()
     gmsh.model.add("blocks")
     occ = gmsh.model.occ
     rectangle = lambda x0, y0, x1, y1: (2, occ.addRectangle(x0, y0, 0, x1 - x0, y1 - y0))
