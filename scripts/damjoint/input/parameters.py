@@ -74,13 +74,14 @@ def start_gmsh() -> ModuleType:
         if threading.current_thread() is threading.main_thread():
             for number, handler in handlers.items():  # Gmsh has reset them to the system's
                 signal.signal(number, handler)
-        quiet(gmsh)
+        raise_errors(gmsh)
     return gmsh
 
 
-def quiet(gmsh: ModuleType) -> None:
-    """Let Gmsh print nothing: its errors are raised."""
+def raise_errors(gmsh: ModuleType) -> None:
+    """Let Gmsh print nothing, and raise its errors."""
     gmsh.option.setNumber("General.Verbosity", 0)
+    gmsh.option.setNumber("General.AbortOnError", 2)
 
 
 def empty_gmsh() -> ModuleType:
@@ -90,7 +91,7 @@ def empty_gmsh() -> ModuleType:
     gmsh = start_gmsh()
     gmsh.clear()
     gmsh.option.restoreDefaults()
-    quiet(gmsh)
+    raise_errors(gmsh)
     return gmsh
 
 
