@@ -313,6 +313,26 @@ def test_the_end_of_a_branch_above_which_a_run_stands_is_not_confirmed(monkeypat
     assert f"but a run stands at {answer.stands_at:.6g} m" in answer.doubt
 
 
+@pytest.mark.heavy
+def test_no_bound_of_statics_confirms_what_a_run_passes_where_water_enters(monkeypatch):
+    """A dam of 76 m on friction: water entered an element, the level fell by 0.1 %, no increment
+    led on, and 73.70 m was confirmed by a bound of statics at 74.85 m, beside 74.20 m.
+    """
+    limit, advance = slide_level(0.35, 1000, True), FailurePath.advance_branch
+    monkeypatch.setattr(
+        *(FailurePath, "advance_branch"),
+        lambda self: self.points[-1].level < 0.982 * limit and advance(self),
+    )
+    ends = lambda self, last: vars(self).update(ended=True)
+    monkeypatch.setattr(FailurePath, "pass_over", ends)
+    monkeypatch.setattr(FailurePath, "repeated", lambda self: None)
+    settings = {"pena_tang": 0.0, "uplift": "cracked"}
+    _, answer = search_result("c", settings=settings, levels=f"3,{0.975 * limit}")
+    assert 0.98 * limit < answer.value < 0.999 * limit and not answer.confirmed
+    assert "by statics there is no equilibrium above" in answer.doubt
+    assert answer.stands_at == pytest.approx(limit, rel=PRECISION)
+
+
 @pytest.mark.parametrize(
     "name, settings, limit, mode",
     [

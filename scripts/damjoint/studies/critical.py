@@ -329,8 +329,11 @@ class Search:
         and by other ways, if shorter increments have led to no other path, see `level_path`.
         """
         mechanism = bool(result.why)
-        if not mechanism and result.growth is None:
-            result = self.with_end_of(path, result)
+        if result.growth is None:
+            if not mechanism:
+                result = self.with_end_of(path, result)
+            elif path.stops_at_water:  # the bound of statics alone is not near enough
+                result = self.with_run(path, result)
         if other is None:
             ways = ways_to_confirm(first, path, result, grows, mechanism)
             paths = (self.from_beginning(path, way) for path, way in ways)

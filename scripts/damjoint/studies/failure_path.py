@@ -22,7 +22,7 @@ from ..model.results import HISTORY, Columns, with_all_joints
 from ..solver.controls import LevelControl
 from ..solver.history import JointState
 from ..solver.load_stepper import SAME_TIME, LoadStepper
-from ..solver.path import RISE, EquilibriumPath, Point, Solved, solve_once
+from ..solver.path import RISE, SURE, EquilibriumPath, Point, Solved, solve_once
 
 #: Columns of critical.csv: a row per equilibrium of each dam that was tried. With several joints:
 #: of the first one; see `critical_columns`.
@@ -216,6 +216,14 @@ class FailurePath(EquilibriumPath):
         """Whether nothing is known of its end but that no increment, however short, leads on."""
         known = self.ends_at_strength or self.falls
         return self.stops and not known
+
+    @property
+    def stops_at_water(self) -> bool:
+        """Whether no increment leads on, not even to a mechanism, where water enters the crack: it
+        may be an element of it at which the level falls, and filling leads on.
+        """
+        shown = self.slides or self.ends_at_strength or self.crushed_at_top or self.settled(SURE)
+        return self.entering and self.stops and not shown
 
     @property
     def weighed_with_water(self) -> bool:
