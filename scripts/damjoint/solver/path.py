@@ -104,7 +104,7 @@ FALL = 1e-3
 #: An increment is halved, too, as long as points whose damage grows by more than this in a half [-]
 #: lose tensile strength of more than the part FALL of the water's thrust: where they soften in a
 #: single increment the level may fall within it.
-LARGEST_GROWTH = 0.35
+LARGEST_GROWTH = 0.1
 #: Growth of damage and slip over the movement, over what it was before, below which a fall of the
 #: level is elastic unloading along the path [-].
 UNLOADING = 0.05
