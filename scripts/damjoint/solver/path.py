@@ -149,9 +149,9 @@ REPEATED = 0.01
 #: By how many times shorter increments it is repeated.
 SHORTER = 4
 
-#: A path whose level falls below this part of its highest one is not followed farther: the joints
-#: hold no water any more.
-STRENGTH_LOST = 0.01
+#: A path whose level falls below this part of its highest one is not followed farther [-]: the
+#: joints hold a sixteenth of the water's thrust, and what is left of them will not hold more again.
+STRENGTH_LOST = 0.25
 #: Most equilibria on a path by increments of the usual rise; by shorter ones as many more.
 MOST_POINTS = 800
 
@@ -517,7 +517,12 @@ class EquilibriumPath:
     @property
     def exhausted(self) -> bool:
         """Whether it has as many points as a path may have, or the strength is lost."""
-        return self.unfinished or self.points[-1].level < STRENGTH_LOST * self.highest
+        return self.unfinished or self.loses_strength
+
+    @property
+    def loses_strength(self) -> bool:
+        """Whether hardly any strength remains on it."""
+        return self.points[-1].level < STRENGTH_LOST * self.highest
 
     @property
     def unfinished(self) -> bool:
