@@ -9,7 +9,7 @@ from damjoint.input.resolve import load
 from damjoint.joint.interface import interface_of
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.solver.model import StepResult
-from damjoint.solver.path import PRECISION, SURE, EquilibriumPath, Point
+from damjoint.solver.path import PRECISION, STRENGTH_LOST, SURE, EquilibriumPath, Point
 from damjoint.statics.hints import hints, hints_on_path
 from damjoint.statics.statement import level_of_growth, statement
 from damjoint.statics.verdict import verdict
@@ -285,10 +285,11 @@ def test_a_step_to_the_other_equilibrium_of_its_level_is_taken_again():
 
 @pytest.mark.heavy
 def test_a_path_ends_where_all_strength_is_lost():
-    """Nothing holds a dam whose mixed joint has broken whole: the level falls to the base."""
+    """Nothing holds a dam whose mixed joint has broken whole: the path ends as the level falls."""
     case = load("dam", {"law": "mixed", "n_joint": 10})
     path = FailurePath(case, interface_of(case), target=60)
     path.follow(np.inf)
     levels = np.array([point.level for point in path.points])
     assert path.ended
-    assert levels[-1] < 0.01 * levels.max() <= levels[:-1].min()
+    assert levels[-1] < STRENGTH_LOST * levels.max()
+    assert levels[levels.argmax() : -1].min() >= STRENGTH_LOST * levels.max()

@@ -150,9 +150,11 @@ def in_units(case, units):
 
 @pytest.mark.heavy
 @few
-@given(joints, levels, st.sampled_from(["level", "crest"]), st.tuples(*[st.floats(-1, 1)] * 3))
+@given(joints, levels, st.sampled_from(["level", "crest"]), st.tuples(*[st.floats(-0.5, 0.5)] * 3))
 def test_results_do_not_depend_on_units(solve, joint, level, drive, powers):
-    """Each parameter is converted by the unit in its label, each column by that of the tables."""
+    """Each parameter is converted by the unit in its label, each column by that of the tables. The
+    units differ by factors up to 3.2: a density of concrete remains below what is allowed.
+    """
     case = load("dam", SECTION | LOADS | joint | {"drive": drive}, f"30,{level!r}", "3")
     other, scaled = in_units(case, 10 ** np.array(powers))
     same(solve(case), solve(other), scaled)
