@@ -714,6 +714,25 @@ def test_a_point_that_levels_pass_over_is_no_confirmed_growth():
 
 
 @pytest.mark.heavy
+def test_a_level_that_falls_to_a_quarter_after_a_branch_has_ended_is_the_highest_one():
+    """Water enters before the highest level, element by element: there the first branch ends."""
+    dam = {"dam_height": 25.32, "dam_base": 18.57, "dam_crest": 2.39, "n_joint": 20.0}
+    joint = {"law": "endo", "K_N": 3.617e10, "K_T": 4.98e10, "sigma_max": 41090.0, "G_f": 112.3}
+    joint |= {
+        "adhesion": 62460.0,
+        "mu": 1.183,
+        "uplift": "cracked",
+        "drain_x": 4.585,
+        "drains": 1.0,
+    }
+    bodies = {"E": 1.337e10, "E_found": 2.449e10, "nu": 0.1494}
+    search, answer = search_result("dam", settings=dam | joint | bodies, levels="7.596")
+    ended = search.trials[-1].path
+    assert ended.starts and ended.loses_strength
+    assert answer.value == pytest.approx(32.6539, rel=1e-4) and answer.confirmed
+
+
+@pytest.mark.heavy
 def test_levels_do_not_pass_over_a_snap_back_of_the_process_zone():
     """Four points of it lose 4, 7, 12 and 11 % of their strength as one breaks: the level falls by
     1.7e-3 there. Levels to be reached beyond it passed over it, as shorter increments did, and

@@ -647,6 +647,8 @@ class Search:
             return replace(result, mode="sliding", why=slips_whole(path), doubt="")
         if path.falls:
             return replace(result, why=lost_beyond_limit(path), doubt="")
+        if path.loses_strength:  # after the end of a branch
+            return self.with_run(path, replace(result, why=lost_beyond_limit(path), doubt=""))
         if path.branch_ends:
             return self.with_run(path, replace(result, why=end_of_branch(path), doubt=""))
         return result

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..model.results import column_of
-from ..solver.path import Point
+from ..solver.path import STRENGTH_LOST, Point
 from .failure_path import FailurePath
 
 
@@ -34,11 +34,13 @@ def beyond_limit(path: FailurePath) -> str:
 
 
 def lost_beyond_limit(path: FailurePath) -> str:
-    """What is said of a path that is lost beyond the limit point."""
+    """What is said of a path that is lost beyond the limit point, or not followed farther."""
     low = min(point.level for point in path.points[path.top :])
+    lost = f"are not followed below {STRENGTH_LOST:g} of it"
     return (
         f"there the level has a limit point: the equilibria beyond it are lower, down to {low:.6g} "
-        "m, shorter increments lead to the same, and further ones are not found"
+        "m, shorter increments lead to the same, and further ones "
+        f"{lost if path.loses_strength else 'are not found'}"
     )
 
 
