@@ -105,6 +105,9 @@ FALL = 1e-3
 #: lose tensile strength of more than the part FALL of the water's thrust: where they soften in a
 #: single increment the level may fall within it.
 LARGEST_GROWTH = 0.1
+#: The same of laws that release their shear: it is released at once, and smaller growth that counts
+#: lets branches end at single points that change no level.
+LARGEST_GROWTH_OF_RELEASE = 0.35
 #: Growth of damage and slip over the movement, over what it was before, below which a fall of the
 #: level is elastic unloading along the path [-].
 UNLOADING = 0.05
@@ -350,8 +353,11 @@ class Point:
         the increment or, if begun is true, begin to; strengths [Pa]: of each joint.
         """
         growth = self.damage - begin.damage
-        counts = (growth > LARGEST_GROWTH) | (begun & (begin.damage == 0))
-        lost = self.model.equilibrium.interface.weights * np.where(counts, growth, 0)
+        equilibrium = self.model.equilibrium
+        releases = equilibrium.laws.releases_shear
+        largest = LARGEST_GROWTH_OF_RELEASE if releases else LARGEST_GROWTH
+        counts = (growth > largest) | (begun & (begin.damage == 0))
+        lost = equilibrium.interface.weights * np.where(counts, growth, 0)
         if not lost.any():
             return 0.0
         parts = zip(self.laws, strengths, self.state.variables.split(lost), strict=True)
