@@ -57,7 +57,8 @@ class PlasticReturn(NamedTuple):
     compliance: tuple[Array, Array, Array, Array]
     #: derivative of the plastic jump with the damage, with the other sign [m]: n, along, across
     decline: tuple[Array, Array, Array]
-    #: -d/d alpha of the energy that one unit of damage releases, over G_f (q,)
+    #: energy that one unit of damage releases, over G_f, and -d/d alpha of it (q,)
+    release_rate: Array
     decrease: Array
 
     def in_plane(self, along: Array, across: Array) -> tuple[Array, Array]:
@@ -153,8 +154,9 @@ class Endo(SofteningLaw[EndoVariables]):
         # the flow along the normal (mu, 1) of the yield surface, or to its apex
         stiff = stiff_t + mu**2 * stiff_n
         multiplier = np.maximum(size + mu * X_n, 0) / stiff
-        apex = size < stiff_t * multiplier
-        smooth, to_n, to_t = (multiplier > 0) / stiff, 1 / stiff_n, 1 / stiff_t
+        flows = multiplier > 0
+        apex = flows & (size < stiff_t * multiplier)
+        smooth, to_n, to_t = flows / stiff, 1 / stiff_n, 1 / stiff_t
         nn, na = np.where(apex, to_n, mu**2 * smooth), np.where(apex, 0, mu * smooth)
         aa, cc = np.where(apex, to_t, smooth), np.where(apex, to_t, multiplier / least)
         p_n = before_n + np.where(apex, X_n * to_n, mu * multiplier)
@@ -170,73 +172,36 @@ class Endo(SofteningLaw[EndoVariables]):
             direction=(t_1, t_2),
             compliance=(nn, na, aa, cc),
             decline=decline,
+            release_rate=-dS * work,
             decrease=d2S * work - dS * relieved,
         )
 
-    def trial(self, jump: Array, variables: EndoVariables) -> Array:
-        """What `release` needs of a step, (10, q): along n, t1, t2 the elastic trial of sigma, B p
-        and p before the step; and the square of the last one along t1, t2.
-        """
-        before = np.roll(variables.plastic.T, 1, axis=0)
-        K, B = self.K[:, None], self.B[:, None]
-        square = before[1] ** 2 + before[2] ** 2
-        return np.vstack([K * (jump.T - before), B * before, before, square])
-
-    def release(self, trial: Array, odds: Array) -> tuple[Array, Array]:
-        """At odds = log(alpha/(1 - alpha)) (q,): the energy that one unit of damage releases, over
-        G_f; and -d/d odds of its logarithm. The return is that of `plastic_return`.
-        """
-        e_n, e_1, e_2, back_n, back_1, back_2, p_n, p_1, p_2, square = trial
-        (K_n, K_t, _), (B_n, B_t, _), mu = self.K, self.B, self.mu
-        inverse = np.exp(-odds)
-        alpha = 1 / (1 + inverse)
-        rest = alpha * inverse
-        S, slope = rest * rest * rest / np.sqrt(alpha), 2.5 * alpha + 0.5
-        falls = S * slope  # -S' alpha (1 - alpha)
-        stiff_n, stiff_t = K_n + S * B_n, K_t + S * B_t
-        stiff = stiff_t + mu**2 * stiff_n
-        X_n, X_1, X_2 = e_n - S * back_n, e_1 - S * back_1, e_2 - S * back_2
-        size = np.hypot(X_1, X_2)
-        least = np.maximum(size, 1e-300)
-        multiplier = np.maximum(size + mu * X_n, 0) / stiff
-        # the apex opens by more than the cone's side, and slips by less
-        opening, slip = X_n / stiff_n, size / stiff_t
-        apex = slip < multiplier
-        opening, slip = np.maximum(opening, mu * multiplier), np.minimum(slip, multiplier)
-        along = (p_1 * X_1 + p_2 * X_2) / least
-        across = B_t * (square - along * along)
-        b_n, p_a = back_n + B_n * opening, along + slip
-        b_a = B_t * p_a
-        work = b_n * (p_n + opening) + b_a * p_a + across
-        side = (mu * b_n + b_a) ** 2 / stiff * (multiplier > 0) + B_t * across * slip / least
-        relieved = np.where(apex, b_n**2 / stiff_n + (b_a**2 + B_t * across) / stiff_t, side)
-        rate = falls * work / (2 * self.energy * alpha * rest)
-        # S'' alpha^2 (1 - alpha)^2 = 0.6 (slope^2 + 1) S
-        decrease = 0.6 * (slope + 1 / slope) - 2 * falls * relieved / np.maximum(work, 1e-300)
-        return rate, decrease
-
     def damaged(self, jump: Array, variables: EndoVariables) -> Array:
-        """The damage after the step (q,): the root of the released energy = G_f, by Newton's method
-        between the logarithms of both its sides, see `release`, within a bracket.
+        """The damage after the step (q,): the root of release_rate = 1, by Newton's method between
+        the logarithms of the rate and of alpha/(1 - alpha), within a bracket.
         """
-        alpha, trial = variables.alpha.copy(), self.trial(jump, variables)
-        odds = np.log(np.maximum(alpha, LEAST)) - np.log1p(-alpha)
-        rate, decrease = self.release(trial, odds)
-        grows = rate > 1
+        alpha = variables.alpha.copy()
+        grows = self.plastic_return(jump, variables, alpha).release_rate > 1
         if not grows.any():
             return alpha
-        trial, low, rate, decrease = trial[:, grows], odds[grows], rate[grows], decrease[grows]
-        odds, high = low, np.full(len(low), np.log(LARGEST) - np.log1p(-LARGEST))
+        jump = jump[grows]
+        variables = EndoVariables(alpha[grows], variables.plastic[grows])
+        low = np.log(np.maximum(variables.alpha, LEAST)) - np.log1p(-variables.alpha)
+        high = np.full(len(low), np.log(LARGEST) - np.log1p(-LARGEST))
+        odds = np.where(variables.alpha > 0, low, 0.0)
         for _ in range(MOST_ITERATIONS):
-            newton = odds + np.log(rate) / decrease
+            share = 1 / (1 + np.exp(-odds))
+            at = self.plastic_return(jump, variables, share)
+            low = np.where(at.release_rate > 1, odds, low)
+            high = np.where(at.release_rate > 1, high, odds)
+            slope = at.decrease * share * (1 - share) / at.release_rate
+            newton = odds + np.log(at.release_rate) / slope
             inside = (newton >= low) & (newton <= high)
             step = np.where(inside, newton, (low + high) / 2) - odds
             odds = odds + step
             if (np.abs(step) <= ACCURACY).all():
                 break
-            rate, decrease = self.release(trial, odds)
-            low, high = np.where(rate > 1, odds, low), np.where(rate > 1, high, odds)
-        alpha[grows] = np.maximum(1 / (1 + np.exp(-odds)), alpha[grows])
+        alpha[grows] = np.maximum(1 / (1 + np.exp(-odds)), variables.alpha)
         return alpha
 
     # -- response
