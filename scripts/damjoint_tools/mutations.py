@@ -188,8 +188,8 @@ MUTATIONS = (
     Mutation(
         "voids lose their water",
         "joint/flow_in_time.py",
-        "beyond=self.opened + self.storage * pressure - void,",
-        "beyond=self.opened + self.storage * pressure,",
+        "change=self.opened + self.storage * pressure - void,",
+        "change=self.opened + self.storage * pressure,",
         having("time_unit"),
     ),
     Mutation(

@@ -718,14 +718,8 @@ def test_a_level_that_falls_to_a_quarter_after_a_branch_has_ended_is_the_highest
     """Water enters before the highest level, element by element: there the first branch ends."""
     dam = {"dam_height": 25.32, "dam_base": 18.57, "dam_crest": 2.39, "n_joint": 20.0}
     joint = {"law": "endo", "K_N": 3.617e10, "K_T": 4.98e10, "sigma_max": 41090.0, "G_f": 112.3}
-    joint |= {
-        "adhesion": 62460.0,
-        "mu": 1.183,
-        "uplift": "cracked",
-        "drain_x": 4.585,
-        "drains": 1.0,
-    }
-    bodies = {"E": 1.337e10, "E_found": 2.449e10, "nu": 0.1494}
+    joint |= {"adhesion": 62460.0, "mu": 1.183, "uplift": "cracked", "drains": 1.0}
+    bodies = {"E": 1.337e10, "E_found": 2.449e10, "nu": 0.1494, "drain_x": 4.585}
     search, answer = search_result("dam", settings=dam | joint | bodies, levels="7.596")
     ended = search.trials[-1].path
     assert ended.starts and ended.loses_strength

@@ -8,7 +8,7 @@ import gmsh
 import numpy as np
 import pytest
 from damjoint import InputError, data
-from damjoint.input.parameters import start_gmsh
+from damjoint.input.parameters import empty_gmsh
 from damjoint.input.resolve import load
 from damjoint.mesh.mesh import Mesh
 
@@ -30,8 +30,7 @@ def recipe(language):
 @pytest.fixture
 def drawn(tmp_path):
     """The mesh of geo/stepped.geo as dam.med and dam.inp, and as the package meshes it."""
-    start_gmsh()
-    gmsh.clear()
+    empty_gmsh()
     gmsh.parser.clear()
     (tmp_path / "own.geo").write_text(f'{COARSE}Include "{data("geo")}/stepped.geo";\n')
     gmsh.open(str(tmp_path / "own.geo"))
@@ -93,8 +92,7 @@ def test_an_abaqus_file_itself_is_refused(drawn, monkeypatch, allowed):
 @pytest.mark.parametrize("unit", [1.0, 1e3])
 def test_a_drawing_in_step_format(tmp_path, monkeypatch, unit):
     """In millimetres, as CAD programs write it; of another size a line says what is missing."""
-    start_gmsh()
-    gmsh.clear()
+    empty_gmsh()
     corners = [gmsh.model.occ.addPoint(unit * x, unit * y, 0) for x, y in SECTION]
     lines = [
         gmsh.model.occ.addLine(corner, following)

@@ -4,7 +4,7 @@ import gmsh
 import numpy as np
 import pytest
 from damjoint import InputError, runner
-from damjoint.input.parameters import start_gmsh
+from damjoint.input.parameters import empty_gmsh
 from damjoint.input.resolve import load
 from damjoint.mesh.mesh import Mesh
 from damjoint.statics.hints import hints
@@ -106,8 +106,7 @@ def draw(tmp_path):
     """draw(changes): a case file of a dam of two blocks, with changes of its mesh."""
 
     def make(rename=(), apart=False, order=1):
-        start_gmsh()
-        gmsh.clear()
+        empty_gmsh()
         geo = gmsh.model.geo
         corners = [(0, 0), (2, 0), (2, 3), (0, 3), (-4, 0), (-4, -4), (6, -4), (6, 0)]
         p = [geo.addPoint(x, y, 0, 1) for x, y in corners]

@@ -37,7 +37,7 @@ def test_the_water_is_kept(splitting):
     assert stored.inflow.sum() == pytest.approx(stored.volume.sum(), rel=1e-11)
     now = splitting.at(splitting.unknowns, 0.12)
     held = splitting.storage @ now.pressure
-    assert now.water.beyond.sum() == pytest.approx(volume.sum() + held, rel=1e-11)
+    assert now.water.change.sum() == pytest.approx(volume.sum() + held, rel=1e-11)
 
 
 def test_the_measured_force_on_a_coarse_mesh(splitting):

@@ -42,9 +42,9 @@ LAST_BIT = 2.0**-53
 @dataclass(frozen=True, kw_only=True)
 class StoredWater:
     """The water in joints that exchange it, at their nodes (n,) [m3; 2D: per metre]: volume of the
-    closed joints, and what is stored beyond it; voids beside it; what has come in by ends and
-    drains so far. time: t of this state; begin: that from which the step has led to here. parts:
-    this is their mean, see `FlowInTime`.
+    closed joints, and what is stored more or less than that; voids beside it; what has come in by
+    ends and drains so far. time: t of this state; begin: that from which the step has led to here.
+    parts: this is their mean, see `FlowInTime`.
 
     Two numbers: by the last digit of their sum a film without storage changes its pressure by more
     than an equilibrium may.
@@ -52,7 +52,7 @@ class StoredWater:
 
     time: float
     closed: Array
-    beyond: Array
+    change: Array
     void: Array
     inflow: Array
     begin: StoredWater | None = None
@@ -61,7 +61,7 @@ class StoredWater:
     @property
     def volume(self) -> Array:
         """All that is stored."""
-        return self.closed + self.beyond
+        return self.closed + self.change
 
     def after(self, begin: StoredWater) -> StoredWater:
         """This state, as the end of a step from another one."""
@@ -90,15 +90,15 @@ class TimeStep:
 
 @dataclass(frozen=True, kw_only=True)
 class FlowInTime(FlowSolution):
-    """A solution at the end of a time step, with the water at the nodes: stored beyond the volume
-    of the closed joints, voids, inflow in the step, as in `StoredWater`. at_ends: pressure beyond
-    the imposed one at the ends [Pa]: a dry one may be higher than the imposed head. parts: with
-    drains of part effect, the solutions without drains and with full effect, of which this is the
-    mean; each stores water of its own.
+    """A solution at the end of a time step, with the water at the nodes: stored more than the
+    volume of the closed joints, voids, inflow in the step, as in `StoredWater`. at_ends: pressure
+    beyond the imposed one at the ends [Pa]: a dry one may be higher than the imposed head. parts:
+    with drains of part effect, the solutions without drains and with full effect, of which this is
+    the mean; each stores water of its own.
     """
 
     at_ends: Array
-    beyond: Array
+    change: Array
     void: Array
     inflow: Array
     parts: tuple[FlowInTime, ...] = ()
@@ -111,7 +111,7 @@ class FlowInTime(FlowSolution):
             pressure=mean.pressure,
             systems=mean.systems,
             at_ends=self.at_ends,
-            beyond=rest * self.beyond + share * other.beyond,
+            change=rest * self.change + share * other.change,
             void=rest * self.void + share * other.void,
             inflow=rest * self.inflow + share * other.inflow,
         )
@@ -127,7 +127,7 @@ class FlowInTime(FlowSolution):
         end = StoredWater(
             time=time,
             closed=begin.closed,
-            beyond=self.beyond,
+            change=self.change,
             void=self.void,
             inflow=inflow,
             parts=parts,
@@ -141,7 +141,8 @@ class WaterBalance:
 
     flow: Flow
     step: TimeStep
-    #: volume beyond that of the closed joint that each node stands for, and what it stores [m3/Pa]
+    #: by how much the opening increases the volume that each node stands for, and what this volume
+    #: stores [m3/Pa]
     opened: Array
     storage: Array
     #: height times the water's weight [Pa]; pressure of cavitation [Pa]
@@ -166,7 +167,7 @@ class WaterBalance:
         nan if no set of nodes with voids is found.
         """
         seconds, begin = self.step.seconds, self.step.begin
-        ground, before = self.storage / seconds, begin.beyond
+        ground, before = self.storage / seconds, begin.change
         rest = before - self.opened + self.storage * self.elevation
         if beside is not None:
             rest = rest - seconds * beside
@@ -210,7 +211,7 @@ class WaterBalance:
                         )
                     ],
                     at_ends=(total - imposed)[self.flow.fields.ends],
-                    beyond=self.opened + self.storage * pressure - void,
+                    change=self.opened + self.storage * pressure - void,
                     void=void,
                     inflow=inflow,
                 )
@@ -220,7 +221,7 @@ class WaterBalance:
             pressure=nothing[self.flow.inside],
             systems=[],
             at_ends=nothing[self.flow.fields.ends],
-            beyond=nothing,
+            change=nothing,
             void=nothing,
             inflow=nothing,
         )
@@ -481,8 +482,8 @@ class OnSurface:
 def stored_at_rest(
     closed: Array, opened: Array, storage: Array, pressure: Array, time: float
 ) -> StoredWater:
-    """Full joints of these volumes, closed and beyond, under a pressure (n,) [Pa], from where
-    inflow counts.
+    """Full joints, of these volumes when closed and by their opening, under a pressure (n,) [Pa],
+    from where inflow counts.
     """
     nothing, full = np.zeros(len(closed)), opened + storage * pressure
-    return StoredWater(time=time, closed=closed, beyond=full, void=nothing, inflow=nothing)
+    return StoredWater(time=time, closed=closed, change=full, void=nothing, inflow=nothing)

@@ -59,7 +59,7 @@ class Drainage:
 class Apertures:
     """The apertures of the joints of a `WaterSystem`, one array for each."""
 
-    #: beyond that of the closed joint, and its derivative with the opening: `JointWater.widening`
+    #: `JointWater.widening`, and its derivative with the opening
     wider: list[Array]
     growth: list[Array]
     #: of all joints, over that of the closed first one, times weights of the points (q,)
@@ -211,8 +211,8 @@ class JointWater:
         return self.case["aperture_min"] if flow else self.case.shared["crack_aperture"][0]
 
     def widening(self, jump: Array, variables: Any) -> tuple[Array, Array]:
-        """Aperture at the law's points beyond that of the closed joint, over this, and its
-        derivative with the opening.
+        """By how much the aperture at the law's points exceeds that of the closed joint, over that
+        of the closed joint, and its derivative with the opening.
 
         flow: cubic law, of the opening beyond that at which closing stress has narrowed the joint
         to `aperture_min`. cracked: the same, but of the opening beyond that of a crack, and bounded
@@ -662,16 +662,16 @@ class WaterSystem:
         return self.closed + self.opened_at(jump)
 
     def opened_at(self, jump: Array) -> Array:
-        """See `opened_by`."""
+        """By how much the opening increases that volume, at a jump."""
         return self.opened_by([water.widening(jump, None)[0] for water in self.members])
 
     @cached_property
     def closed(self) -> Array:
-        """The same of the closed joint."""
+        """Volume of the closed joint that each node stands for (n,) [m3; 2D: per metre]."""
         return self.opened_by([np.ones(len(w.joint.points.weights)) for w in self.members])
 
     def opened_by(self, wider: list[Array]) -> Array:
-        """The same beyond that of the closed joint, by the `widening` of each joint."""
+        """By how much the `widening` of each joint increases that volume."""
         apertures = [
             water.case["aperture_min"] * one for water, one in zip(self.members, wider, strict=True)
         ]
@@ -695,8 +695,8 @@ class WaterSystem:
         if not 0 < effect < 1:
             return by(effect)
         free, drained = by(0.0), by(1.0)
-        mean = (1 - effect) * free.beyond + effect * drained.beyond
-        return replace(free, beyond=mean, parts=(free, drained))
+        mean = (1 - effect) * free.change + effect * drained.change
+        return replace(free, change=mean, parts=(free, drained))
 
     def gradients(self, solution: FlowSolution, water: JointWater) -> list[Array]:
         """Gradient of the total head times the water's weight at the Gauss points of one of the

@@ -460,8 +460,8 @@ class LoadStepper:
             del path.points[0]  # under other loads: not on this path
         while path.highest < level:
             # (a mechanism of an earlier path, under other loads, does not end this one)
-            fails = path.slides or path.loses_strength
-            fails = fails or path.settled(ROUGH if path.ended else SURE)
+            factor = ROUGH if path.ended else SURE
+            fails = path.slides or path.loses_strength or path.settled(factor)
             first = again and same and origin is start
             if (fails or path.ended) and first and (earlier := self.before_limit_point(path)):
                 origin, path = earlier, self.path_from(earlier, time)

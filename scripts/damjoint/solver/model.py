@@ -211,7 +211,6 @@ class Model:
         parts = ("growth", "secant", "release", "iterations")
         table = zip(*(self.case.shared[f"strategy_{n}"] for n in parts), strict=True)
         halvings = int(self.case["max_halvings"])
-        most = 2 if self.equilibrium.laws.releases_shear else 0
         return tuple(
             Strategy(
                 growth,
@@ -222,7 +221,7 @@ class Model:
                 (PATIENCE_OF_RELEASE if release else PATIENCE) * iterations,
             )
             for growth, secant, release, iterations in table
-            if release <= most
+            if not release or self.equilibrium.laws.releases_shear
         )
 
     @property

@@ -159,15 +159,16 @@ class GravityValues:
         cracks in equilibrium decides; joint: the number of the only joint that is considered.
         """
 
-        def reserve(value: float) -> float:
+        def least(value: float) -> float:
             return self.reserve(value, tension, longest, joint)
 
-        here = reserve(value)
+        at_value = least(value)
         for share in DISTANCES:
             for other in (value * (1 + share), value * (1 - share)):
-                there = reserve(other)
-                if np.isfinite([here, there]).all() and (here < 0) != (there < 0):
-                    return float(brentq(reserve, value, other, rtol=PRECISION / 1000))
+                at_other = least(other)
+                fails = at_value < 0, at_other < 0
+                if np.isfinite([at_value, at_other]).all() and fails[0] != fails[1]:
+                    return float(brentq(least, value, other, rtol=PRECISION / 1000))
         return None
 
     def rigid_blocks(self, value: float, tension: bool = True) -> list[gravity.GravityMethod]:
@@ -209,16 +210,16 @@ class GravityValues:
 
 
 def reserve(method: gravity.GravityMethod, longest: bool) -> float:
-    """What a rigid block has left until it slides, if its law has friction, or its toe is crushed,
-    over its resistance, below 0 beyond that, -1 if it overturns [-]; longest: with the longest of
-    several cracks in equilibrium.
+    """The reserve of a rigid block against sliding, if its law has friction, and crushing of its
+    toe, over its resistance: negative if it fails, -1 if it overturns [-]; longest: with the
+    longest of several cracks in equilibrium.
     """
     case, method = method.case, (method, *method.further)[-1] if longest else method
     if not method.stands:
         return -1.0
-    left = [1.0]
+    reserves = [1.0]
     if case.law.has_friction:
-        left.append(1 - 1 / method.SSF if method.SSF > 0 else -1.0)
+        reserves.append(1 - 1 / method.SSF if method.SSF > 0 else -1.0)
     if case["f_c"] > 0:
-        left.append(1 + method.sigma_n_toe / case["f_c"])
-    return min(left)
+        reserves.append(1 + method.sigma_n_toe / case["f_c"])
+    return min(reserves)

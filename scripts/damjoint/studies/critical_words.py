@@ -36,11 +36,10 @@ def beyond_limit(path: FailurePath) -> str:
 def lost_beyond_limit(path: FailurePath) -> str:
     """What is said of a path that is lost beyond the limit point, or not followed farther."""
     low = min(point.level for point in path.points[path.top :])
-    lost = f"are not followed below {STRENGTH_LOST:g} of it"
+    end = f"followed below {STRENGTH_LOST:g} of it" if path.loses_strength else "found"
     return (
         f"there the level has a limit point: the equilibria beyond it are lower, down to {low:.6g} "
-        "m, shorter increments lead to the same, and further ones "
-        f"{lost if path.loses_strength else 'are not found'}"
+        f"m, shorter increments lead to the same, and further ones are not {end}"
     )
 
 
