@@ -125,7 +125,7 @@ EXACT, OF_SIZE = 1e-6, 1e-8
 @pytest.mark.parametrize("law", OF_LAWS)
 def test_the_results_of_a_run_against_central_differences(law, uplift):
     """Of fourth order, of runs that are converged to round-off; joint cracked and slipping."""
-    weak = {"mu": 1.2, "adhesion": 4e4, "sigma_max": 3e4, "dam_base": 26, "tolerance": 1e-13}
+    weak = {"mu": 1.2, "adhesion": 4e4, "sigma_max": 3e4, "dam_base": 26, "tolerance": 3e-14}
     if law == "mixed":  # without friction: strength holds it
         weak |= {"sigma_max": 8e5, "G_f": 500.0}
     weak |= {"softening": "exponential"} if uplift in EXPONENTIAL else {}
@@ -144,7 +144,7 @@ def test_the_results_of_a_run_against_central_differences(law, uplift):
         assert abs(last["crack_end"] - last["crack_length"]) < 26 / 12
     for row in rows:
         # its points slip one after the other; other laws are smooth farther, and less is round-off
-        step = (2e-5 if law == "friction" else 5e-5) * row.value
+        step = (2e-5 if law == "friction" else 1e-4) * row.value
         at = {k: history(dj.case(case, **{row.name: row.value + k * step})) for k in (-2, -1, 1, 2)}
         for column in SIZES.keys() & row.derivatives.keys():
             size = SIZES[column]
