@@ -172,6 +172,22 @@ def test_a_path_whose_water_withdraws_again_at_the_same_place_ends():
 
 
 @pytest.mark.heavy
+def test_a_path_whose_level_falls_where_water_enters_goes_on_as_filling_does():
+    """The crack grows through at 91.09 m, and the dam stands up to 101.26 m. From one first level
+    the equilibria of falling level led nowhere, and 91.09 m was confirmed beside 101.26 m.
+    """
+    section = {"dam_height": 96.91, "dam_base": 61.42, "dam_crest": 7.75, "E_found": 7.261e9}
+    joint = {"law": "endo", "uplift": "cracked", "sigma_max": 77210.0, "adhesion": 100200.0}
+    joint |= {"K_N": 7.226e10, "K_T": 6.342e10, "mu": 1.03, "G_f": 44.64, "n_joint": 20}
+    concrete = {"E": 1.935e10, "nu": 0.1313}
+    case = Search(load("dam", section | joint | concrete, "29.073,64.9297"), "level").base
+    path = FailurePath(case, interface_of(case), target=95.0)
+    path.follow(SURE)
+    assert path.passed_growth == pytest.approx(91.09, rel=1e-4)
+    assert path.reached
+
+
+@pytest.mark.heavy
 def test_a_step_that_breaks_a_joint_at_once_is_tried_by_shorter_ones(solve):
     """One step leads to a base that has slipped whole at 154 m, with as much strength left as its
     shear; shorter ones lead to 190.5 m, and a path, without the lift, to 195.45 m.

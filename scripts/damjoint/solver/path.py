@@ -686,8 +686,11 @@ class EquilibriumPath:
 
     def pass_over(self, last: Point) -> None:
         """Append an equilibrium beyond a point, whether of its branch or not."""
-        end = self.by_relaxation(last) if self.relaxes else self.by_displacement(last)
-        self.ended = end is None
+        self.pass_to(self.by_relaxation(last) if self.relaxes else self.by_displacement(last))
+
+    def pass_to(self, end: Point | None) -> None:
+        """Append an equilibrium beyond the last point, see `pass_over`; None: there is none."""
+        last, self.ended = self.points[-1], end is None
         if end:
             rise = max((end.level - last.level) / end.level, 1e-12)
             by = end.imposed - self.imposed(last)
@@ -719,17 +722,23 @@ class EquilibriumPath:
         """The equilibrium after unstable crack growth at a level higher by the precision, and twice
         as much from one relaxation to the next, as long as there is one.
         """
-        time, number = max(last.state.time, self.time) + self.tick, len(self.points)
-        again = 0
+        number, again = len(self.points), 0
         while number - 1 - again in self.starts:
             again += 1
-        for power in range(again, -1, -1):
-            control = LevelControl(last.level * (1 + 2**power * PRECISION))
-            result, _ = over_unstable_growth(last.model, last.state, time, control, True)
-            if result is not None:
-                by = float(np.abs(result.state.jump - last.state.jump).max())
-                return last.after(result, self.imposed(last) + by, "level")
-        return None
+        rises = (2**power * PRECISION for power in range(again, -1, -1))
+        return next(filter(None, (self.relaxed(last, rise) for rise in rises)), None)
+
+    def relaxed(self, last: Point, rise: float) -> Point | None:
+        """The equilibrium after unstable crack growth at a level that is higher than a point's by a
+        part of it; None if relaxation leads to none.
+        """
+        time = max(last.state.time, self.time) + self.tick
+        control = LevelControl(last.level * (1 + rise))
+        result, _ = over_unstable_growth(last.model, last.state, time, control, True)
+        if result is None:
+            return None
+        by = float(np.abs(result.state.jump - last.state.jump).max())
+        return last.after(result, self.imposed(last) + by, "level")
 
     def append(
         self, new: list[Point], another: bool = False, error: float = 0.0, shortened: bool = False

@@ -275,7 +275,10 @@ class Search:
             doubt = f"there is an equilibrium at {first.target:.4g} m, twice the dam's height"
             return CriticalValue(None, "", "", doubt, first.points[-1])
         result, path = self.at_limit(first, grows)
-        return self.confirmation(first, path, result, grows, other) if result.point else result
+        if not result.point:
+            return result
+        result = self.confirmation(first, path, result, grows, other)
+        return result if result.growth else replace(result, growth=path.passed_growth)
 
     def level_path(self) -> tuple[FailurePath, bool, FailurePath | None]:
         """The path to the critical level; whether a crack grows unstably there, see `finished`; and

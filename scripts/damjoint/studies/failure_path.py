@@ -22,7 +22,7 @@ from ..model.results import HISTORY, Columns, with_all_joints
 from ..solver.controls import LevelControl
 from ..solver.history import JointState
 from ..solver.load_stepper import SAME_TIME, LoadStepper
-from ..solver.path import RISE, SURE, EquilibriumPath, Point, Solved, solve_once
+from ..solver.path import PRECISION, RISE, SURE, EquilibriumPath, Point, Solved, solve_once
 
 #: Columns of critical.csv: a row per equilibrium of each dam that was tried. With several joints:
 #: of the first one; see `critical_columns`.
@@ -44,6 +44,8 @@ SOFTENED = 0.1
 #: How often a step of the level is halved at most, until its two halves lead to the same state.
 HALVINGS = 4
 
+#: At how many levels, of twice the rise each, relaxation is tried just above the highest one.
+FILLED = 4
 #: The part of the uplift by which it falls under a rising level where the water withdraws.
 WITHDRAWN = 0.005
 
@@ -315,7 +317,7 @@ class FailurePath(EquilibriumPath):
         """
         while not (self.ended or self.decided(factor) or self.highest > enough):
             self.advance()
-            if self.water_withdraws and not self.to_growth:
+            if not self.to_growth and (self.water_withdraws or (self.entering and self.ended)):
                 self.fill_on()
             if self.to_growth and self.top + 1 < len(self.points):
                 self.refine(self.points[-1].level / (1 - self.unstable_fall))  # how far it falls
@@ -323,9 +325,9 @@ class FailurePath(EquilibriumPath):
             self.refine(self.target)
 
     def fill_on(self) -> None:
-        """Continue from the highest level as filling does, which does not let the water out: by
-        relaxation at a level higher by the precision, if others follow that equilibrium; once from
-        each, as the same increments follow again.
+        """Continue from the highest level as filling does, which lets no water out and follows no
+        falling level: by relaxation at a level just above, if others follow that equilibrium; once
+        from each, as the same increments follow again.
         """
         if any(self.points[self.top] is point for point in self.filled_on):
             self.leads_higher = True
@@ -334,11 +336,12 @@ class FailurePath(EquilibriumPath):
         other = self.copied()
         del other.points[self.top + 1 :]
         other.starts = [number for number in self.starts if number <= self.top]
-        other.relaxes, other.ended = True, False
-        other.pass_over(other.points[-1])
+        last = other.points[-1]
+        rises = (2**power * PRECISION for power in range(FILLED))
+        end = next(filter(None, (other.relaxed(last, rise) for rise in rises)), None)
+        other.pass_to(end)
         if other.ended:
             return
-        other.relaxes = False
         other.advance()
         self.leads_higher = other.ended
         if not other.ended:
@@ -382,6 +385,17 @@ class FailurePath(EquilibriumPath):
     def grows(self) -> bool:
         """Whether a crack has grown unstably: the level has fallen, or the branch has ended."""
         return bool(self.starts) or self.growth_until(len(self.points)) is not None
+
+    @property
+    def passed_growth(self) -> float | None:
+        """The level [m] below its highest one at which its branch was left for a state with much
+        less tension: unstable crack growth; None if there is none.
+        """
+        for number in self.starts:
+            before, after = self.points[number - 1 : number + 1]
+            if number <= self.top and after.leaps(before):
+                return before.level
+        return None
 
     # -- refinement of its end
     # ----------------------------------------------------------------------------------------------
