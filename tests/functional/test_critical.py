@@ -30,7 +30,7 @@ from damjoint.statics.verdict import highest_by_statics, verdict
 from damjoint.studies import failure_path
 from damjoint.studies.critical import QUICK, Search, run_to
 from damjoint.studies.critical_study import critical, printed_lines, table
-from damjoint.studies.critical_ways import SHORTER, Way
+from damjoint.studies.critical_ways import SHORTER, Way, falls_by_water
 from damjoint.studies.critical_words import by_increments
 from damjoint.studies.failure_path import FailurePath
 from variants import further
@@ -311,6 +311,20 @@ def test_the_end_of_a_branch_above_which_a_run_stands_is_not_confirmed(monkeypat
     slides_at = slide_level(0.35, 1000, True)  # the run goes on until it does
     assert answer.stands_at == pytest.approx(slides_at, rel=PRECISION) and not answer.after
     assert f"but a run stands at {answer.stands_at:.6g} m" in answer.doubt
+
+
+@pytest.mark.parametrize(
+    "levels, falls",
+    [((68.01, 67.93, 67.96), True), ((68.01, 68.0, 67.9), True), ((68.01, 68.0, 68.005), False)],
+)
+def test_the_level_falls_before_or_after_the_water_withdraws(levels, falls):
+    """Highest level, last one that counts, last one: a dam of 57 m with law bond had a limit point
+    at 68.01 m, with all increments and in runs of several steps, that was not confirmed.
+    """
+    points = [SimpleNamespace(level=level) for level in levels]
+    path = SimpleNamespace(points=points, counted=2, highest=levels[0])
+    path.water_withdraws, path.leads_higher = True, False
+    assert falls_by_water(path) == falls
 
 
 @pytest.mark.heavy

@@ -70,8 +70,11 @@ def ways_to_confirm(
 
 
 def falls_by_water(path: FailurePath) -> bool:
-    """Whether the level of a path falls where the water withdraws, and none leads higher."""
-    fallen = path.points[-1].level < (1 - FALL) * path.highest
+    """Whether the level of a path has fallen where the water withdraws, or falls then, and none
+    leads higher.
+    """
+    ends = path.points[path.counted - 1], path.points[-1]
+    fallen = min(point.level for point in ends) < (1 - FALL) * path.highest
     return path.water_withdraws and fallen and not path.leads_higher
 
 
