@@ -256,7 +256,7 @@ class LoadStepper:
                 yield self.state
                 continue
             if step:
-                self.try_halves(step)
+                self.passed_over += self.passed_by(step)
             if step is None and not weighed:
                 weighed = True
                 if weight := self.weigh():
@@ -308,6 +308,7 @@ class LoadStepper:
         """
         other, end, smallest = self.fork(self.case), whole.state.time, self.case["smallest_step"]
         dt, accepted = end - self.state.time, False  # of the whole step
+        taken = list[tuple[LoadStepper, StepResult]]()
         while other.state.time < end:
             if not accepted and dt < smallest * (1 + SAME_TIME):
                 self.record_leap(other.state, whole.state)
@@ -320,34 +321,34 @@ class LoadStepper:
             moves = bool(step and not least and other.moves_pressure(step))
             accepted = bool(step and not moves and not other.leaps(step))
             if step and accepted:
-                other.try_halves(step)
+                taken.append((other.fork(self.case), step))
                 other.accept(step, cuts=0)
         if self.model.damage_between(other.state, whole.state) <= SAME_DAMAGE:
             return False
         self.state, self.history = other.state, other.history
-        self.largest_move, self.passed_over = other.largest_move, other.passed_over
+        self.largest_move = other.largest_move
+        for begin, step in taken:
+            self.passed_over += begin.passed_by(step)
         self.on_step(end)
         return True
 
-    def try_halves(self, step: StepResult) -> None:
-        """Record a direct step that adds damage, but of which a half leads to no equilibrium: it
-        has passed over a limit point.
+    def passed_by(self, step: StepResult) -> tuple[tuple[float, float], ...]:
+        """The levels of a direct step that adds damage, but of which a half leads to no
+        equilibrium: it has passed over a limit point. Empty if it has not.
         """
         begin, end = self.state, step.state
-        if self.drives or not self.unresolved:
-            return
-        if self.model.damage_between(begin, end) <= GROWS:
-            return
         levels = float(begin.loading.level), float(end.loading.level)
-        if levels in self.leapt:
-            return
+        if self.drives or not self.unresolved or levels in self.leapt:
+            return ()
+        if self.model.damage_between(begin, end) <= GROWS:
+            return ()
         other = self.fork(self.case)
         for time in ((begin.time + end.time) / 2, end.time):
             half = other.direct_step(time, smallest=False)
             if half is None:
-                self.passed_over += (levels,)
-                return
+                return (levels,)
             other.accept(half, cuts=0)
+        return ()
 
     def record_leap(self, begin: State, end: State) -> None:
         """Record that a joint breaks at once from one state to another."""
