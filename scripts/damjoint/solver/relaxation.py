@@ -15,6 +15,11 @@ from .state import State
 #: as one in which the law is not in equilibrium.
 ROUNDS = 100
 
+#: Residual of the law at the relaxed state, over the loads, above which Newton's method is not
+#: tried from there without placing points in the release of their shear [-]. Of 132 random dams and
+#: 25 cases, what converged had begun below 0.3, and nothing above 1.
+FAR = 1.0
+
 #: Relative difference of the residuals of two rounds below which they have led to the same state
 #: [-]. The rounds then repeat themselves, and end without a state.
 SAME = 1e-6
@@ -33,6 +38,7 @@ def relax(
     equilibrium, state = model.equilibrium, begin
     laws, iterations, sizes = equilibrium.laws, 0, list[float]()
     relaxed: StepResult | None = None
+    moved = np.zeros_like(begin.jump)  # in the last round
     before_quake = model.before_quake(begin, time)
     strategies = [strategy for strategy in model.strategies[:-1] if not strategy.release]
     steps = model.water_steps(begin, time)
@@ -41,7 +47,15 @@ def relax(
         frozen = start.freeze(equilibrium)
         coupled = strategies[:1] if equilibrium.flowing else strategies
         begun = model.begin(start, time, frozen)
-        step = begun.solve(control, StepOptions(coupled, persist=False))
+        step = None
+        if len(sizes) > 1 and sizes[-1] < sizes[-2]:
+            # from where the last round leads on to: at its own end all slip and contact would begin
+            # elastic, and yield again one after the other
+            last, level = begun.predict(control, extrapolate=False)
+            guess = last + sizes[-1] / sizes[-2] * moved, level
+            options = StepOptions(strategies[:1], persist=False, guess=guess)
+            step = begun.solve(control, options)
+        step = step or begun.solve(control, StepOptions(coupled, persist=False))
         if step is None and equilibrium.flowing:
             level = control.level if isinstance(control, LevelControl) else start.loading.level
             opened = before_quake or start
@@ -52,6 +66,7 @@ def relax(
         if step is None:
             return None
         iterations += step.iterations
+        moved = step.state.jump - state.jump
         state = replace(step.state, time=begin.time, stored=begin.stored)
         jump, variables = state.jump, state.begin_step(laws, time).variables
         problem = equilibrium.problem(variables, before_quake, steps=steps)
@@ -79,11 +94,13 @@ def over_unstable_growth(
     if end is None:
         return None, False
     relaxed, balanced = end
+    begun, jump, loading = model.begin(begin, time), relaxed.state.jump, relaxed.state.loading
+    size = float(np.linalg.norm(begun.problem.residual(jump, loading).value))
     first, *others = model.strategies
-    strategies = [first, *(strategy for strategy in others if strategy.release)]
-    guess = relaxed.state.jump, relaxed.state.loading.level
-    options = StepOptions(strategies, persist=False, guess=guess)
-    step = model.advance(begin, time, control, options)
+    strategies = [first] if size <= FAR * model.reference else []
+    strategies += [strategy for strategy in others if strategy.release]
+    guess = jump, loading.level
+    step = begun.solve(control, StepOptions(strategies, persist=False, guess=guess))
     if step:
         return replace(step, iterations=relaxed.iterations + step.iterations), False
     return (relaxed, True) if accept_relaxed and balanced else (None, False)
