@@ -716,6 +716,19 @@ RELEASED |= {"K_N": 7.296e10, "K_T": 4.914e10, "sigma_max": 136.9e3, "pena_ruptu
 RELEASED |= {"uplift": "cracked", "drain_x": 1.808, "drains": 1.0}
 
 
+def test_a_release_of_shear_without_a_fall_of_the_level_is_no_growth():
+    """Points release their shear one by one from 44.86 m on, each while the level rises. It was the
+    first unstable growth at the one at which increments ended: 53.8 m, not confirmed.
+    """
+    dam = {"dam_height": 44.76, "dam_base": 30.68, "dam_crest": 3.072, "n_joint": 40.0}
+    joint = {"law": "rupture", "K_N": 3.203e10, "K_T": 4.488e10, "sigma_max": 0.0, "alpha": 1.5}
+    bodies = {"E": 2.265e10, "E_found": 1.203e10, "nu": 0.228, "uplift": "none"}
+    settings = dam | joint | bodies | {"pena_rupture": 0.3297}
+    _, answer = search_result("dam", settings=settings, levels="13.428,44.76")
+    assert answer.value == pytest.approx(68.6603, rel=1e-5) and answer.confirmed
+    assert answer.mode == "overturning" and answer.growth is None
+
+
 @pytest.mark.heavy
 def test_a_point_that_levels_pass_over_is_no_confirmed_growth():
     """By levels the point at 19.95 m is passed over, by increments of a displacement it is not: the

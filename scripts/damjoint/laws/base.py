@@ -7,7 +7,7 @@ Signs: opening > 0, tension > 0, downstream > 0.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -177,6 +177,15 @@ class Law(Generic[V]):
     def slip(self, variables: V, points: int) -> Array:
         """Size of the plastic or released slip (q,) [m]."""
         return np.zeros(points)
+
+    @property
+    def stages(self) -> Sequence[float]:
+        """Openings in the course of the release of the shear and of the softening [m]."""
+        return ()
+
+    def released_part(self, jump: Array, variables: V) -> Array:
+        """The part of the shear stiffness that opening has released (q,)."""
+        return np.zeros(len(jump))
 
     def has_slipped(self, variables: V, points: int) -> BoolArray:
         """Whether a point has slipped, or its shear has been released."""

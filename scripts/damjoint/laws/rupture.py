@@ -219,6 +219,16 @@ class Rupture(SofteningLaw[RuptureVariables]):
         """See `SofteningLaw`: the remaining part of the shear stiffness."""
         return self.shear_share(self.opening(jump, variables))
 
+    @property
+    def stages(self) -> list[float]:
+        """See `Law`."""
+        softening = (self.delta_e, (self.delta_e + self.L_end) / 2, self.L_end)
+        return sorted({self.L_CT / 2, self.L_CT, *softening})
+
+    def released_part(self, jump: Array, variables: RuptureVariables) -> Array:
+        """See `Law`."""
+        return 1 - self.shear_share(self.opening(jump, variables))
+
     def release_side(self, jump: Array, variables: RuptureVariables) -> NDArray[np.int_]:
         """See `Law`."""
         opening = self.opening(jump, variables)

@@ -10,7 +10,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Array
+from .. import ROUND_OFF
+from ..arrays import Array, BoolArray
 from ..input.case import Case
 from ..input.scene import POINT
 from ..joint.equilibrium import Equilibrium
@@ -248,3 +249,33 @@ def process_zone(equilibrium: Equilibrium, state: State) -> Array | None:
         return None
     direction *= (weights / np.where(size > 0, size, 1) / weights.sum())[:, None]
     return interface.at_points.T @ direction[:, : interface.dim].ravel()
+
+
+def crack_tip(equilibrium: Equilibrium, state: State) -> tuple[Array, float] | None:
+    """The opening, from the unknowns (j,), of the point that opens next, and how far it is from its
+    next stage [m], see `Law.stages`: of the points that are not broken, or that release their
+    shear, the one with the largest jump; None if it does not open in the step to a state, or has no
+    further stage.
+    """
+    if state.previous is None:
+        return None
+    interface, variables = equilibrium.interface, state.variables
+    before, after = (
+        interface.jumps(interface.at_points, end.jump) for end in (state.previous, state)
+    )
+    laws = equilibrium.laws.laws
+    parts = zip(laws, variables.split(after), variables.joints, strict=True)
+    opens = list[BoolArray]()
+    for law, jump, own in parts:
+        released = law.released_part(jump, own)
+        releases = (released > 0) & (released < 1)
+        opens.append(law.releases_shear & (releases | (law.damage(jump, own) < 1)))
+    opening = np.where(np.concatenate(opens), after[:, 0], -np.inf)
+    point = int(np.argmax(opening))
+    number = int(np.searchsorted(variables.starts, point, side="right")) - 1
+    stages = [stage for stage in laws[number].stages if stage > (1 + ROUND_OFF) * opening[point]]
+    if not stages or not opening[point] > before[point, 0]:
+        return None
+    direction = np.zeros((len(after), interface.dim))
+    direction[point, 0] = 1.0
+    return interface.at_points.T @ direction.ravel(), stages[0] - float(opening[point])

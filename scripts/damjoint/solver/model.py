@@ -318,6 +318,14 @@ class Model:
         first = self.strategies[:1]
         return self.advance(state, time, control, StepOptions(first, extrapolate=True))
 
+    def advance_along(self, state: State, time: float, control: Control) -> StepResult | None:
+        """`advance_by_first`, also by the strategies that place points inside the release of their
+        shear.
+        """
+        first, *others = self.strategies
+        strategies = [first, *(strategy for strategy in others if strategy.release)]
+        return self.advance(state, time, control, StepOptions(strategies, extrapolate=True))
+
     def predict(
         self, state: State, time: float, control: Control, extrapolate: bool
     ) -> tuple[Array, float]:

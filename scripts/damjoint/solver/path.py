@@ -34,6 +34,7 @@ from .controls import (
     DisplacementControl,
     HeelControl,
     LevelControl,
+    crack_tip,
     process_zone,
 )
 from .history import History
@@ -108,9 +109,24 @@ LARGEST_GROWTH = 0.1
 #: The same of laws that release their shear: it is released at once, and smaller growth that counts
 #: lets branches end at single points that change no level.
 LARGEST_GROWTH_OF_RELEASE = 0.35
+#: Largest growth of the damage of a point in a half of an increment where points are opened one by
+#: one [-].
+AT_ONCE = 0.6
 #: Growth of damage and slip over the movement, over what it was before, below which a fall of the
 #: level is elastic unloading along the path [-].
 UNLOADING = 0.05
+
+# Where points are opened one by one, and no other displacement leads on
+
+#: What is prescribed there: the opening of the point that opens next; if that leads nowhere, the
+#: level.
+TIP, FILLING = "tip", "filling"
+#: Largest relative rise of the level that is tried [-].
+FILLED = 4e-4
+#: How many rises are tried, each a quarter of the one before.
+FILLED_AT_MOST = 5
+#: Difference of the change of the jumps in the first half from half of it, over it [-].
+STEADY = 0.3
 
 # A branch counts as lost after many short increments
 
@@ -290,11 +306,12 @@ class Point:
         return replace(control, value=self.model.measure(control, self.state) + by)
 
     def step(self, time: float, control: Control, imposed: float, kind: str) -> Point | None:
-        """The next equilibrium, by the first strategy; None if it does not converge.
+        """The next equilibrium, see `Model.advance_along`; None if it does not converge.
 
         imposed: the displacement imposed there [m]; kind: what is prescribed.
         """
-        result = self.model.advance_by_first(self.state, time, control)
+        advance = self.model.advance_along if self.opens_points else self.model.advance_by_first
+        result = advance(self.state, time, control)
         return self.after(result, imposed, kind) if result else None
 
     def after(self, result: StepResult, imposed: float, kind: str) -> Point:
@@ -304,12 +321,19 @@ class Point:
         return replace(self, state=result.state, history=history, imposed=imposed, control=kind)
 
     def irreversible(self, state: State) -> Array:
-        """Damage and slip of all points in a state, (2 q,)."""
+        """Damage and slip of all points in a state, (2 q,); in place of the slip of a law that
+        releases its shear, which goes back as well, the released part of its stiffness.
+        """
         interface, laws = self.model.equilibrium.interface, self.model.equilibrium.laws
-        variables = state.variables
+        variables, opens = state.variables, self.opens_points
         jumps = interface.jumps(interface.at_points, state.jump)
         parts = zip(laws.laws, variables.split(jumps), variables.joints, strict=True)
-        slips = (law.slip(own, len(jump)) for law, jump, own in parts)
+        slips = (
+            law.released_part(jump, own)
+            if opens and law.releases_shear
+            else law.slip(own, len(jump))
+            for law, jump, own in parts
+        )
         return np.concatenate([laws.damage(jumps, variables), *slips])
 
     @cached_property
@@ -319,7 +343,8 @@ class Point:
         if before is None or not self.movement.any():
             return 0.0
         growth = self.irreversible(self.state) - self.irreversible(before)
-        return float(np.abs(growth).sum() / np.abs(self.movement).max())
+        growth = np.maximum(growth, 0) if self.opens_points else np.abs(growth)
+        return float(growth.sum() / np.abs(self.movement).max())
 
     @cached_property
     def damage(self) -> Array:
@@ -333,6 +358,12 @@ class Point:
         tension = [law.tensile_strength for law in self.laws]
         return self.lost(begin, tension, begun=False) > FALL * self.thrust
 
+    def opens_at_once(self, begin: Point) -> bool:
+        """Whether a point has lost most of its tensile strength since another equilibrium."""
+        at_once = self.damage - begin.damage > AT_ONCE
+        parts = zip(self.laws, self.state.variables.split(at_once), strict=True)
+        return any(law.tensile_strength > 0 and own.any() for law, own in parts)
+
     def hidden_rise(self, begin: Point) -> float:
         """By how much the level may be higher between another equilibrium and this one [m]: up to
         the strength that is lost by points that begin to soften in between.
@@ -342,6 +373,14 @@ class Point:
             shear = law.intact_cohesion
             strengths.append(law.tensile_strength + (shear if shear < np.inf else 0.0))
         return self.level * self.lost(begin, strengths, begun=True) / self.thrust
+
+    @cached_property
+    def opens_points(self) -> bool:
+        """Whether points are opened one by one: there is a law whose shear opening releases, and
+        the uplift does not follow the opening.
+        """
+        follows = any(joint["uplift"] in ("cracked", "flow") for joint in self.model.case.joints)
+        return self.model.equilibrium.laws.releases_shear and not follows
 
     @property
     def laws(self) -> Sequence[Law[Any]]:
@@ -418,7 +457,16 @@ class Point:
         """Whether the level falls in the last step while damage and slip grow by a small part of
         what they did up to another point: elastic unloading along the path already passed.
         """
+        crests = self.history.rows["crest_ux"][-2:]
+        if self.opens_points and crests[-1] > crests[0]:  # nothing grows where the whole dam tips
+            return False
         return self.level < begin.level and self.dissipation <= UNLOADING * begin.dissipation
+
+    def steady(self, middle: Point, end: Point) -> bool:
+        """Whether the jumps change from here to the end of an increment as in its first half."""
+        changes = end.state.jump - self.state.jump, middle.state.jump - self.state.jump
+        whole, half = changes
+        return bool(np.abs(half - whole / 2).max() <= STEADY * np.abs(whole).max())
 
     def beyond(self, end: Point, begin: Point) -> bool:
         """Whether more damage has grown than up to an end, both reached from the same begin: then
@@ -663,15 +711,53 @@ class EquilibriumPath:
                 by = part * self.increment(control)
                 if abs(by) < max(LEAST * self.imposed(last), self.negligible(last, control)):
                     continue
-                new, error = self.along(last, control, by, SHORTENED * abs(by), kind)
+                smallest = SHRINKING if last.opens_points and part == 1 else SHORTENED
+                new, error = self.along(last, control, by, smallest * abs(by), kind)
                 if new:
                     reached = new[-1].imposed - self.imposed(last)
                     self.append(new, error=error, shortened=reached < 0.9 * abs(by) or part < 1)
                     short = reached < CRAWL * self.imposed(last)
                     self.crawled = self.crawled + 1 if short else 0
                     return True
+            if last.opens_points and part == 1:
+                new = self.by_tip(last) or self.by_filling(last)
+                if new:
+                    self.append(new)
+                    self.crawled = 0
+                    return True
             part *= SHORTENED
         return False
+
+    def by_tip(self, last: Point) -> list[Point]:
+        """The equilibria at the middle and the end of an increment of the opening of the point
+        that opens next; empty if there is none.
+        """
+        tip = crack_tip(last.model.equilibrium, last.state)
+        if tip is None:
+            return []
+        control, by = DirectionControl(0.0, tip[0]), tip[1]
+        return self.along(last, control, by, SHORTENED**2 * by, TIP)[0]
+
+    def by_filling(self, last: Point) -> list[Point]:
+        """The equilibria at the middle and the end of the largest rise of the level in which the
+        jumps change steadily; empty if there is none.
+        """
+        for rise in (FILLED / 4**n for n in range(FILLED_AT_MOST)):
+            middle = self.raised(last, rise / 2)
+            end = middle and self.raised(middle, rise / 2)
+            if middle and end and last.steady(middle, end):
+                return [middle, end]
+        return []
+
+    def raised(self, point: Point, rise: float) -> Point | None:
+        """The equilibrium at a level higher by a relative rise."""
+        level, time = point.level * (1 + rise), max(point.state.time, self.time) + self.tick
+        if level > point.model.case.highest_level:
+            return None
+        end = solve_once(self.solved, point, time, LevelControl(level), 0.0, FILLING)
+        if end is None:
+            return None
+        return replace(end, imposed=self.imposed(point) + float(np.abs(end.movement).max()))
 
     def negligible(self, point: Point, control: DisplacementControl) -> float:
         """The increment from a point [m] up to which the branch ends there, to the precision: it is
@@ -680,7 +766,10 @@ class EquilibriumPath:
         before, moved = point.state.previous, abs(point.moved(control))
         if before is None or not before.pressures:
             return 0.0
-        rise = abs(point.level - before.loading.level)
+        rise = point.level - before.loading.level
+        if rise < 0 and point.opens_points:  # the snap-back of a point begins with short ones
+            return 0.0
+        rise = abs(rise)
         short = CRAWL * self.imposed(point)
         return min(short, NEGLIGIBLE_RISE * point.level * moved / rise) if rise else short
 
@@ -766,7 +855,9 @@ class EquilibriumPath:
         if last.state.previous is None or not last.movement.any():
             return FIRST * self.imposed(last)
         factor = min(self.growth, self.longest / float(np.abs(last.movement).max()))
-        return factor * last.moved(control)
+        by, least = factor * last.moved(control), CRAWL * self.imposed(last)
+        # as the next point opens, the rest of the joint may hardly move
+        return float(np.copysign(least, by)) if last.control == TIP and abs(by) < least else by
 
     def along(
         self, point: Point, control: DisplacementControl, by: float, smallest: float, kind: str
@@ -790,9 +881,13 @@ class EquilibriumPath:
                 return [whole], error
             middle = self.step(point, point.further(control, by / 2), by / 2, kind)
             end = middle and self.step(middle, ahead, by / 2, kind)
-            if middle and end and self.agree(point, whole, middle, end) and not end.unloads(point):
+            if middle and end and self.agree(point, whole, middle, end):
+                if end.unloads(point) or (point.opens_points and middle.unloads(point)):
+                    whole, by = middle, by / 2
+                    continue
                 moved = np.abs(end.state.jump - point.state.jump).max()
-                if moved < SHORT * self.imposed(point) or self.straight(point, middle, end):
+                short = kind == TIP or moved < SHORT * self.imposed(point)
+                if short or self.straight(point, middle, end):
                     return [middle, end], 0.0
             whole, by = middle, by / 2 * (SHRINKING if middle is None else 1)
         return [], 0.0
@@ -801,7 +896,7 @@ class EquilibriumPath:
         """How far an increment is off the one before, over what is allowed if it is to need no
         halves; inf if it needs them.
         """
-        if not self.predicts or (self.to_growth and end.leaps(begin)) or end.unloads(begin):
+        if not self.predicts or (self.to_growth and self.leaps(begin, end)) or end.unloads(begin):
             return np.inf
         return begin.prediction_error(end, max(self.highest, begin.level, end.level))
 
@@ -809,11 +904,18 @@ class EquilibriumPath:
         """Whether one step and two halves lead to the same state; up to unstable growth, also
         whether no tension is lost, and no water enters, at once in one of the halves.
         """
-        if self.to_growth and (middle.leaps(begin) or end.leaps(middle)):
+        if self.to_growth and (self.leaps(begin, middle) or self.leaps(middle, end)):
             return False
         bend = np.abs(middle.uplifts - (begin.uplifts + end.uplifts) / 2).max(initial=0)
         enters = bend > FALL * middle.thrust and not end.reaches_joint(begin)
         return not ((self.to_growth and enters) or whole.differs(end, begin))
+
+    def leaps(self, begin: Point, end: Point) -> bool:
+        """Whether tension is lost at once in an increment, see `Point.leaps`; where points are
+        opened one by one, also whether one of them breaks at once: the level may fall within, by
+        more than the tension that is lost.
+        """
+        return end.leaps(begin) or (end.opens_points and end.opens_at_once(begin))
 
     def straight(self, begin: Point, middle: Point, end: Point) -> bool:
         """Whether no limit point is between three equilibria: the levels are in line, or low."""
@@ -939,7 +1041,8 @@ class EquilibriumPath:
         be inserted.
         """
         a, b = self.points[first], self.points[first + 1]
-        if b.control == "level" or first + 1 in self.starts or any(a is p for p in self.closed):
+        prescribed = b.control in ("level", FILLING)
+        if prescribed or first + 1 in self.starts or any(a is p for p in self.closed):
             return -np.inf
         before, chord = self.slope(first - 1), (b.level - a.level) / (self.length(first) or 1.0)
         # points that begin to soften may do so after a rise

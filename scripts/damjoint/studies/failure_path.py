@@ -22,7 +22,7 @@ from ..model.results import HISTORY, Columns, with_all_joints
 from ..solver.controls import LevelControl
 from ..solver.history import JointState
 from ..solver.load_stepper import SAME_TIME, LoadStepper
-from ..solver.path import PRECISION, RISE, SURE, EquilibriumPath, Point, Solved, solve_once
+from ..solver.path import FILLING, PRECISION, RISE, SURE, EquilibriumPath, Point, Solved, solve_once
 
 #: Columns of critical.csv: a row per equilibrium of each dam that was tried. With several joints:
 #: of the first one; see `critical_columns`.
@@ -62,7 +62,7 @@ def row(point: Point) -> dict[str, float]:
     """The row of critical.csv of a point, but for trial and value."""
     columns = critical_columns(point.model.case)
     return {name: value for name, value in point.last.items() if name in columns} | {
-        "displacement_control": float(point.control != "level"),
+        "displacement_control": float(point.control not in ("level", FILLING)),
         "imposed_displacement": point.imposed,
         "compression": point.compression,
     }
