@@ -313,6 +313,21 @@ def test_the_end_of_a_branch_above_which_a_run_stands_is_not_confirmed(monkeypat
     assert f"but a run stands at {answer.stands_at:.6g} m" in answer.doubt
 
 
+@pytest.mark.heavy
+def test_relaxation_is_tried_where_the_falling_equilibria_lead_nowhere():
+    """The level falls from 46.28 m on, by unstable growth, and the path is lost; a run stands up to
+    55.52 m, of which nothing was said.
+    """
+    section = {"dam_height": 44.92, "dam_base": 32.75, "dam_crest": 5.227, "n_joint": 20}
+    joint = {"law": "rupture", "sigma_max": 125.9e3, "pena_rupture": 1.024, "alpha": 0}
+    joint |= {"K_N": 3.147e10, "K_T": 1.636e10, "uplift": "imposed"}
+    concrete = {"E": 2.363e10, "E_found": 1.983e10, "nu": 0.1536}
+    case = load("dam", section | joint | concrete, "13.476,44.92", "0")
+    answer = Search(case, "level").run()
+    assert answer.confirmed and answer.value == answer.growth == pytest.approx(46.2819, rel=1e-5)
+    assert answer.after == {"by relaxation": pytest.approx(55.5227, rel=1e-5)}
+
+
 @pytest.mark.parametrize(
     "levels, falls",
     [((68.01, 67.93, 67.96), True), ((68.01, 68.0, 67.9), True), ((68.01, 68.0, 68.005), False)],

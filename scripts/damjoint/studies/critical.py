@@ -394,7 +394,7 @@ class Search:
         """
         after, ended, farther = dict[str, float](), path.ended, path
         for name, relaxes in AFTER.items():
-            if relaxes and not (after or ended):
+            if relaxes and not (after or farther.ended):
                 continue
             other = path.copied()
             other.relaxes, other.to_growth, other.ended = relaxes, False, False
@@ -412,7 +412,7 @@ class Search:
                 after[name] = float(other.highest)
                 if enough < np.inf:
                     break
-            elif not ended:
+            elif not (ended or relaxes):
                 farther = other
         return after, path if after else farther
 
