@@ -120,11 +120,11 @@ UNLOADING = 0.05
 
 #: What is prescribed there: the opening of the point that opens next; if that leads nowhere, the
 #: level.
-TIP, FILLING = "tip", "filling"
+TIP, LEVEL_RISE = "tip", "level rise"
 #: Largest relative rise of the level that is tried [-].
-FILLED = 4e-4
+LARGEST_RISE = 4e-4
 #: How many rises are tried, each a quarter of the one before.
-FILLED_AT_MOST = 5
+MOST_RISES = 5
 #: Difference of the change of the jumps in the first half from half of it, over it [-].
 STEADY = 0.3
 
@@ -720,7 +720,7 @@ class EquilibriumPath:
                     self.crawled = self.crawled + 1 if short else 0
                     return True
             if last.opens_points and part == 1:
-                new = self.by_tip(last) or self.by_filling(last)
+                new = self.by_tip(last) or self.by_level_rise(last)
                 if new:
                     self.append(new)
                     self.crawled = 0
@@ -738,11 +738,11 @@ class EquilibriumPath:
         control, by = DirectionControl(0.0, tip[0]), tip[1]
         return self.along(last, control, by, SHORTENED**2 * by, TIP)[0]
 
-    def by_filling(self, last: Point) -> list[Point]:
+    def by_level_rise(self, last: Point) -> list[Point]:
         """The equilibria at the middle and the end of the largest rise of the level in which the
         jumps change steadily; empty if there is none.
         """
-        for rise in (FILLED / 4**n for n in range(FILLED_AT_MOST)):
+        for rise in (LARGEST_RISE / 4**n for n in range(MOST_RISES)):
             middle = self.raised(last, rise / 2)
             end = middle and self.raised(middle, rise / 2)
             if middle and end and last.steady(middle, end):
@@ -754,7 +754,7 @@ class EquilibriumPath:
         level, time = point.level * (1 + rise), max(point.state.time, self.time) + self.tick
         if level > point.model.case.highest_level:
             return None
-        end = solve_once(self.solved, point, time, LevelControl(level), 0.0, FILLING)
+        end = solve_once(self.solved, point, time, LevelControl(level), 0.0, LEVEL_RISE)
         if end is None:
             return None
         return replace(end, imposed=self.imposed(point) + float(np.abs(end.movement).max()))
@@ -1041,7 +1041,7 @@ class EquilibriumPath:
         be inserted.
         """
         a, b = self.points[first], self.points[first + 1]
-        prescribed = b.control in ("level", FILLING)
+        prescribed = b.control in ("level", LEVEL_RISE)
         if prescribed or first + 1 in self.starts or any(a is p for p in self.closed):
             return -np.inf
         before, chord = self.slope(first - 1), (b.level - a.level) / (self.length(first) or 1.0)
