@@ -225,6 +225,11 @@ class Model:
         )
 
     @property
+    def release_strategies(self) -> list[Strategy]:
+        """Those after the first one that place points inside the release of their shear."""
+        return [strategy for strategy in self.strategies[1:] if strategy.release]
+
+    @property
     def convergence(self) -> Convergence:
         """When a step has converged."""
         shared, reference = self.case.shared, self.reference
@@ -322,8 +327,7 @@ class Model:
         """`advance_by_first`, also by the strategies that place points inside the release of their
         shear.
         """
-        first, *others = self.strategies
-        strategies = [first, *(strategy for strategy in others if strategy.release)]
+        strategies = [self.strategies[0], *self.release_strategies]
         return self.advance(state, time, control, StepOptions(strategies, extrapolate=True))
 
     def predict(

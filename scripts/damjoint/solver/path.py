@@ -13,7 +13,7 @@ displacement, is a mechanism.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -121,6 +121,8 @@ UNLOADING = 0.05
 #: What is prescribed there: the opening of the point that opens next; if that leads nowhere, the
 #: level.
 TIP, LEVEL_RISE = "tip", "level rise"
+#: What is prescribed where it is no displacement.
+BY_LEVEL = "level", LEVEL_RISE
 #: Largest relative rise of the level that is tried [-].
 LARGEST_RISE = 4e-4
 #: How many rises are tried, each a quarter of the one before.
@@ -362,7 +364,7 @@ class Point:
         """Whether a point has lost most of its tensile strength since another equilibrium."""
         at_once = self.damage - begin.damage > AT_ONCE
         parts = zip(self.laws, self.state.variables.split(at_once), strict=True)
-        return any(law.tensile_strength > 0 and own.any() for law, own in parts)
+        return any(law.tensile_strength > 0 and points.any() for law, points in parts)
 
     def hidden_rise(self, begin: Point) -> float:
         """By how much the level may be higher between another equilibrium and this one [m]: up to
@@ -464,8 +466,7 @@ class Point:
 
     def steady(self, middle: Point, end: Point) -> bool:
         """Whether the jumps change from here to the end of an increment as in its first half."""
-        changes = end.state.jump - self.state.jump, middle.state.jump - self.state.jump
-        whole, half = changes
+        whole, half = (point.state.jump - self.state.jump for point in (end, middle))
         return bool(np.abs(half - whole / 2).max() <= STEADY * np.abs(whole).max())
 
     def beyond(self, end: Point, begin: Point) -> bool:
@@ -769,9 +770,8 @@ class EquilibriumPath:
         rise = point.level - before.loading.level
         if rise < 0 and point.opens_points:  # the snap-back of a point begins with short ones
             return 0.0
-        rise = abs(rise)
         short = CRAWL * self.imposed(point)
-        return min(short, NEGLIGIBLE_RISE * point.level * moved / rise) if rise else short
+        return min(short, NEGLIGIBLE_RISE * point.level * moved / abs(rise)) if rise else short
 
     def pass_over(self, last: Point) -> None:
         """Append an equilibrium beyond a point, whether of its branch or not."""
@@ -814,20 +814,20 @@ class EquilibriumPath:
         number, again = len(self.points), 0
         while number - 1 - again in self.starts:
             again += 1
-        rises = (2**power * PRECISION for power in range(again, -1, -1))
-        return next(filter(None, (self.relaxed(last, rise) for rise in rises)), None)
+        return self.relaxed(last, range(again, -1, -1))
 
-    def relaxed(self, last: Point, rise: float) -> Point | None:
-        """The equilibrium after unstable crack growth at a level that is higher than a point's by a
-        part of it; None if relaxation leads to none.
+    def relaxed(self, last: Point, powers: Iterable[int]) -> Point | None:
+        """The first equilibrium after unstable crack growth at levels that are higher than a
+        point's by the precision times these powers of 2; None if relaxation leads to none.
         """
         time = max(last.state.time, self.time) + self.tick
-        control = LevelControl(last.level * (1 + rise))
-        result, _ = over_unstable_growth(last.model, last.state, time, control, True)
-        if result is None:
-            return None
-        by = float(np.abs(result.state.jump - last.state.jump).max())
-        return last.after(result, self.imposed(last) + by, "level")
+        for power in powers:
+            control = LevelControl(last.level * (1 + 2**power * PRECISION))
+            result, _ = over_unstable_growth(last.model, last.state, time, control, True)
+            if result is not None:
+                by = float(np.abs(result.state.jump - last.state.jump).max())
+                return last.after(result, self.imposed(last) + by, "level")
+        return None
 
     def append(
         self, new: list[Point], another: bool = False, error: float = 0.0, shortened: bool = False
@@ -1041,8 +1041,8 @@ class EquilibriumPath:
         be inserted.
         """
         a, b = self.points[first], self.points[first + 1]
-        prescribed = b.control in ("level", LEVEL_RISE)
-        if prescribed or first + 1 in self.starts or any(a is p for p in self.closed):
+        closed = any(a is point for point in self.closed)
+        if b.control in BY_LEVEL or first + 1 in self.starts or closed:
             return -np.inf
         before, chord = self.slope(first - 1), (b.level - a.level) / (self.length(first) or 1.0)
         # points that begin to soften may do so after a rise

@@ -96,9 +96,8 @@ def over_unstable_growth(
     relaxed, balanced = end
     begun, jump, loading = model.begin(begin, time), relaxed.state.jump, relaxed.state.loading
     size = float(np.linalg.norm(begun.problem.residual(jump, loading).value))
-    first, *others = model.strategies
-    strategies = [first] if size <= FAR * model.reference else []
-    strategies += [strategy for strategy in others if strategy.release]
+    direct = model.strategies[:1] if size <= FAR * model.reference else []
+    strategies = [*direct, *model.release_strategies]
     guess = jump, loading.level
     step = begun.solve(control, StepOptions(strategies, persist=False, guess=guess))
     if step:

@@ -22,16 +22,7 @@ from ..model.results import HISTORY, Columns, with_all_joints
 from ..solver.controls import LevelControl
 from ..solver.history import JointState
 from ..solver.load_stepper import SAME_TIME, LoadStepper
-from ..solver.path import (
-    LEVEL_RISE,
-    PRECISION,
-    RISE,
-    SURE,
-    EquilibriumPath,
-    Point,
-    Solved,
-    solve_once,
-)
+from ..solver.path import BY_LEVEL, RISE, SURE, EquilibriumPath, Point, Solved, solve_once
 
 #: Columns of critical.csv: a row per equilibrium of each dam that was tried. With several joints:
 #: of the first one; see `critical_columns`.
@@ -71,7 +62,7 @@ def row(point: Point) -> dict[str, float]:
     """The row of critical.csv of a point, but for trial and value."""
     columns = critical_columns(point.model.case)
     return {name: value for name, value in point.last.items() if name in columns} | {
-        "displacement_control": float(point.control not in ("level", LEVEL_RISE)),
+        "displacement_control": float(point.control not in BY_LEVEL),
         "imposed_displacement": point.imposed,
         "compression": point.compression,
     }
@@ -345,10 +336,7 @@ class FailurePath(EquilibriumPath):
         other = self.copied()
         del other.points[self.top + 1 :]
         other.starts = [number for number in self.starts if number <= self.top]
-        last = other.points[-1]
-        rises = (2**power * PRECISION for power in range(RISES))
-        end = next(filter(None, (other.relaxed(last, rise) for rise in rises)), None)
-        other.pass_to(end)
+        other.pass_to(other.relaxed(other.points[-1], range(RISES)))
         if other.ended:
             return
         other.advance()
