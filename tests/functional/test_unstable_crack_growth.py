@@ -7,6 +7,10 @@ import numpy as np
 import pytest
 from damjoint.input.resolve import load
 from damjoint.laws import LAWS
+from damjoint.solver import relaxation
+from damjoint.solver.controls import LevelControl
+from damjoint.solver.load_stepper import LoadStepper
+from damjoint.solver.relaxation import ROUGH
 from damjoint.statics.hints import hints
 from damjoint.statics.verdict import verdict
 from damjoint_witness.files import Files
@@ -62,6 +66,19 @@ def test_a_relaxation_that_converges_slowly_is_ended_by_newtons_method(solve):
     more = {"pena_rupture": 83.2, "uplift": "cracked", "weight_first": 0, "tail_levels": "0.596"}
     (result,) = solve("ssnp142", "6.41,8.13", **dam, **law, **mesh, **more)
     assert verdict(result) == "overturning" and result.last["level"] > 7.4
+
+
+def test_rounds_of_the_relaxation_are_solved_as_far_as_they_count(monkeypatch):
+    """To a part of the law's residual: fewer iterations, the same state after the last round."""
+    stepper = LoadStepper(load("e", {"E_dam": 21e9, "n_joint": 20.0}))
+    stepper.weigh()
+    found = []
+    for rough in (ROUGH, 0.0):
+        monkeypatch.setattr(relaxation, "ROUGH", rough)
+        found.append(relaxation.relax(stepper.model, stepper.state, 3.0, LevelControl(8.0)))
+    (one, balanced), (whole, also) = found
+    assert balanced and also and one.iterations < 0.9 * whole.iterations
+    np.testing.assert_allclose(one.state.jump, whole.state.jump, rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -70,6 +70,8 @@ class StepOptions:
     persist: bool = True
     #: jump (j,) and level to start from in place of those of the last state
     guess: tuple[Array, float] | None = None
+    #: norm of the residual up to which it is solved [N], where that is larger than the tolerance
+    rough: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,9 @@ class Begun:
             )
             for n, strategy in enumerate(model.strategies if tried is None else tried)
         ]
-        plan = Plan(starts, model.convergence, options.persist)
+        convergence = model.convergence
+        convergence = replace(convergence, tolerance=max(convergence.tolerance, options.rough))
+        plan = Plan(starts, convergence, options.persist)
         constraint = None
         if isinstance(control, DisplacementControl):
             constraint = Prescribed(control, model.equilibrium)

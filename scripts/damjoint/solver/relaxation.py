@@ -24,6 +24,11 @@ FAR = 1.0
 #: [-]. The rounds then repeat themselves, and end without a state.
 SAME = 1e-6
 
+#: Residual up to which a round is solved, over that of the law after the last one [-]: the next one
+#: continues from its end. With ten times less the crest of e with E_dam = 21 GPa is 1e-9 beside
+#: that of rounds solved to the tolerance, with this 4e-8, with ten times more 2e-7.
+ROUGH = 1e-4
+
 
 def relax(
     model: Model, begin: State, time: float, control: Control
@@ -47,22 +52,22 @@ def relax(
         frozen = start.freeze(equilibrium)
         coupled = strategies[:1] if equilibrium.flowing else strategies
         begun = model.begin(start, time, frozen)
-        step = None
+        step, rough = None, ROUGH * sizes[-1] if sizes else 0.0
         if len(sizes) > 1 and sizes[-1] < sizes[-2]:
             # from where the last round leads on to: at its own end all slip and contact would begin
             # elastic, and yield again one after the other
             last, level = begun.predict(control, extrapolate=False)
             guess = last + sizes[-1] / sizes[-2] * moved, level
-            options = StepOptions(strategies[:1], persist=False, guess=guess)
+            options = StepOptions(strategies[:1], persist=False, guess=guess, rough=rough)
             step = begun.solve(control, options)
-        step = step or begun.solve(control, StepOptions(coupled, persist=False))
+        step = step or begun.solve(control, StepOptions(coupled, persist=False, rough=rough))
         if step is None and equilibrium.flowing:
             level = control.level if isinstance(control, LevelControl) else start.loading.level
             opened = before_quake or start
             water = equilibrium.water_in_step(opened.variables, steps=steps)
             lift = water.flow(opened.jump, model.loading(time, level)).lift
             begun = replace(begun, constant_lift=lift)
-            step = begun.solve(control, StepOptions(strategies, persist=False))
+            step = begun.solve(control, StepOptions(strategies, persist=False, rough=rough))
         if step is None:
             return None
         iterations += step.iterations
