@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from damjoint.input.resolve import load
 from damjoint.joint.interface import interface_of
+from damjoint.solver.controls import LevelControl
 from damjoint.solver.load_stepper import LoadStepper
-from damjoint.solver.model import StepResult
+from damjoint.solver.model import Model, StepResult
 from damjoint.solver.path import PRECISION, STRENGTH_LOST, SURE, EquilibriumPath, Point
 from damjoint.statics.hints import hints, hints_on_path
 from damjoint.statics.statement import level_of_growth, statement
@@ -63,6 +64,7 @@ STIFF_FRICTION |= {
     "n_joint": 10,
 }
 STIFF_FRICTION |= {"drain_x": 11.8, "drain_effectiveness": 0.492, "drain_level": 17.3}
+SLIDES = {"uplift": "cracked", "sigma_max": 0, "adhesion": 2e4, "mu": 0.6, "n_joint": 10}
 
 
 @pytest.mark.parametrize("law", further(4, LAWS))
@@ -94,6 +96,21 @@ def test_a_dam_on_a_brittle_bond_is_followed_beyond_its_limit_point(solve):
     free = unbonded.last["crack_length"]
     assert 0.93 * free < result.last["crack_length"] < free
     assert result.last["crest_ux"] == pytest.approx(unbonded.last["crest_ux"], rel=0.05)
+
+
+def test_no_step_is_tried_above_the_level_at_which_a_joint_slides(monkeypatch):
+    """A higher one has no equilibrium; the run ends at that level."""
+    stepper = LoadStepper(load("dam", SLIDES, "20,45"))
+    tried, advance = [], Model.advance
+
+    def recorded(self, state, time, control, options=None):
+        tried.extend([control.level] if isinstance(control, LevelControl) else [])
+        return advance(self, state, time, control, options)
+
+    monkeypatch.setattr(Model, "advance", recorded)
+    result = stepper.run()
+    assert verdict(result) == "sliding" and result.last["level"] < 44
+    assert tried == [0, 20, 45]  # over the last one the path leads
 
 
 @pytest.mark.heavy

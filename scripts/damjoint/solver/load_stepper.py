@@ -82,6 +82,9 @@ class LoadStepper:
         self.mechanism: Mechanism | None = None
         #: whether the weight alone, which is to act first, has not converged
         self.weight_with_water = False
+        #: the level [m] at which a joint slides that holds what is above it: a higher one has no
+        #: equilibrium under the same other loads
+        self.slides_at = np.inf
         #: levels of the limit points that have been passed, and the lowest ones behind them [m]
         self.limit_points: tuple[tuple[float, float], ...] = ()
         #: the levels at which a crack grew unstably, to a state that depends on the steps
@@ -281,7 +284,12 @@ class LoadStepper:
                 yield self.state
 
     def direct_step(self, time: float, smallest: bool) -> StepResult | None:
-        """A step to a time from the last state; smallest: whether it can be cut no more."""
+        """A step to a time from the last state; smallest: whether it can be cut no more. None if it
+        has no equilibrium: a joint slides at a lower level.
+        """
+        most = (1 + PRECISION) * self.slides_at
+        if self.case.level_at(time) > most and self.only_level_changes(time):
+            return None
         *strategies, _ = self.model.strategies
         quick = self.beyond_path(smallest) or (self.relaxed_at and not smallest)
         return self.model.advance(
@@ -479,6 +487,7 @@ class LoadStepper:
         if path.highest < level:
             if mechanism:
                 self.mechanism = replace(mechanism, level=float(path.highest))
+                self.slides_at = float(path.highest) if path.slides else np.inf
             self.path_ended = same
             if same:
                 self.end_at_limit_point(path, origin)
