@@ -7,8 +7,11 @@ import pytest
 from damjoint import InputError, runner
 from damjoint.input.resolve import load
 from damjoint.mesh.mesh import mesh_of
+from damjoint.model.loads import COMPLETE
 from damjoint.post import summary
+from damjoint.solver.controls import BodyControl, Prescribed
 from damjoint.solver.load_stepper import LoadStepper
+from damjoint.solver.model import Model
 from damjoint.statics.statement import path_statement
 from damjoint.verification import path_tests
 from numpy.testing import assert_allclose
@@ -38,6 +41,16 @@ def test_the_crest_as_a_point_is_the_crest(solve):
     (point,) = solve("dam", "30,40", drive="point", drive_face="crest", **by)
     same_columns(point, crest, 1e-10)
     assert point.history["point_u"] == pytest.approx(point.history["crest_ux"], rel=1e-10)
+
+
+def test_the_last_digits_of_a_displacement_are_not_missing():
+    """Over stiff joints they weigh more than the tolerance, and no iteration reduces them."""
+    model = Model(load("dam", {"n_joint": 10.0}))
+    loading, jump = COMPLETE, np.full(len(model.equilibrium.bulk.stiffness), 1e-4)
+    moved = BodyControl(0.0).measure(model.equilibrium, jump, loading)
+    for off, missing in ((0.0, 0), (1e-16, 0), (6e-16, 0), (1e-14, 1), (1e-6, 1)):
+        gap = Prescribed(BodyControl(moved * (1 + off)), model.equilibrium).gap(jump, loading)
+        assert gap == pytest.approx(missing * off * moved, rel=0.1, abs=0)
 
 
 @pytest.mark.parametrize("of", LOADS)

@@ -20,6 +20,11 @@ from ..joint.joint_laws import JointLaws, JointVariables
 from ..model.loads import LEVEL, Loading, Unknown
 from .state import State
 
+#: Relative difference of two displacements up to which they are the same [-], a few times what
+#: rounding their last digits makes of it: no iteration reduces it, and over stiff joints it is more
+#: than the tolerance of the residual.
+LAST_DIGITS = 4 * np.finfo(float).eps
+
 
 @dataclass(frozen=True)
 class LevelControl:
@@ -207,8 +212,10 @@ class Prescribed:
             self.between = 0.0, equilibrium.case.highest_level
 
     def gap(self, jump: Array, loading: Loading) -> float:
-        """See `Constraint`."""
-        return self.control.value - self.control.measure(self.equilibrium, jump, loading)
+        """See `Constraint`; none if it is that of the last digits."""
+        value, measured = self.control.value, self.control.measure(self.equilibrium, jump, loading)
+        gap = value - measured
+        return 0.0 if abs(gap) <= LAST_DIGITS * max(abs(value), abs(measured)) else gap
 
     def row(self, jump: Array) -> Array:
         """See `Constraint`."""
