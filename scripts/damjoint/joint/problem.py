@@ -135,14 +135,22 @@ class JointProblem:
             if self.loads:
                 slope = -rate(self.loads, loading, self.size, unknown)
             if water and flow:
-                lift = lambda other: water.flow(jump, other).lift
-                slope = slope - rate(lift, loading, self.size, unknown)
+                further, step = ahead(loading, self.size, unknown)
+                slope = slope - (water.flow(jump, further).lift - flow.lift) / step
             if water and loses:
                 lost = lambda other: interface.forces(water.lost_pressure(at_points, other)[0])
                 slope = slope + rate(lost, loading, self.size, unknown)
             return slope
 
         return Residual(value, by_jump, by_unknown)
+
+
+def ahead(loading: Loading, size: float, unknown: Unknown) -> tuple[Loading, float]:
+    """A loading with a larger value of what is unknown, and by how much, for the derivative of what
+    is linear in it: pressures of laminar flow in the level.
+    """
+    step = DIFFERENCE * max(size, abs(loading.level)) if unknown == LEVEL else 1.0
+    return unknown.at(loading, unknown.of(loading) + step), step
 
 
 def rate(
