@@ -77,9 +77,9 @@ def test_the_line_of_the_shear_release_is_the_law_within_it_and_extended_outside
     law = load("ssnp142", {"sigma_max": 0}).law
     variables = law.initial(3)
     jump = np.array([[0.25, 1e6, 0], [-3.0, 1e6, 0], [5.0, 1e6, 0]]) * law.L_CT
-    line, tangent = law.evaluate(jump, variables, np.ones(3, bool))
+    line, tangent_of = law.evaluate(jump, variables, np.ones(3, bool))
     np.testing.assert_allclose(line[:, 1], law.K_T * np.array([0.75, 4, -4]) * 1e6 * law.L_CT)
-    np.testing.assert_allclose(tangent[:, 1, 0], -law.K_T * 1e6)
+    np.testing.assert_allclose(tangent_of()[:, 1, 0], -law.K_T * 1e6)
     assert law.release_side(jump, variables).tolist() == [0, -1, 1]
     np.testing.assert_array_equal(line[0], law.traction_and_tangent(jump, variables)[0][0])
 

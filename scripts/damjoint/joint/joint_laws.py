@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, BoolArray
 from ..laws import Law
+from ..laws.base import Response
 
 
 @dataclass(frozen=True)
@@ -122,8 +123,8 @@ class JointLaws:
 
     def evaluate(
         self, jump: Array, variables: JointVariables, releasing: BoolArray | None = None
-    ) -> tuple[Array, Array]:
-        """Traction (q, 3) and tangent (q, 3, 3); releasing: points (q,), see `Law.evaluate`."""
+    ) -> Response:
+        """The response of all points; releasing: points (q,), see `Law.evaluate`."""
         inside: list[Any] = [None] * len(self.laws)
         if releasing is not None:
             inside = variables.split(releasing)
@@ -135,8 +136,8 @@ class JointLaws:
         ]
         if len(parts) == 1:
             return parts[0]
-        traction, tangent = (np.concatenate(values) for values in zip(*parts, strict=True))
-        return traction, tangent
+        traction = np.concatenate([traction for traction, _ in parts])
+        return traction, lambda: np.concatenate([tangent() for _, tangent in parts])
 
     def secant_stiffness(self, jump: Array, variables: JointVariables) -> Array:
         """See `Law`."""

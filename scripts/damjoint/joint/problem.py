@@ -126,7 +126,7 @@ class JointProblem:
             value = value - self.constant
 
         def by_jump(secant: bool) -> Tangent:
-            law = self.laws.secant_stiffness(at_points, self.variables) if secant else tangent
+            law = self.laws.secant_stiffness(at_points, self.variables) if secant else tangent()
             law = sum(beside, law)
             return flow.tangent(law) if flow else Tangent(law)
 

@@ -7,14 +7,18 @@ Signs: opening > 0, tension > 0, downstream > 0.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, BoolArray
+
+#: Traction (q, 3), and what computes its tangent (q, 3, 3), which the trials of a line search that
+#: are not accepted do not need.
+Response: TypeAlias = tuple[Array, Callable[[], Array]]
 
 V = TypeVar("V")
 
@@ -111,6 +115,11 @@ class Law(Generic[V]):
         """Traction (q, 3) and consistent tangent (q, 3, 3)."""
         raise NotImplementedError
 
+    def response(self, jump: Array, variables: V) -> Response:
+        """The same, the tangent where it is needed; here at once."""
+        traction, tangent = self.traction_and_tangent(jump, variables)
+        return traction, lambda: tangent
+
     def secant_stiffness(self, jump: Array, variables: V) -> Array:
         """A positive stiffness (q, 3, 3) that does not soften; here the tangent."""
         return self.traction_and_tangent(jump, variables)[1]
@@ -135,16 +144,20 @@ class Law(Generic[V]):
         """Shear stress (q, 2) on the line of the release, and its derivative by opening (q, 2)."""
         raise NotImplementedError
 
-    def evaluate(
-        self, jump: Array, variables: V, releasing: BoolArray | None = None
-    ) -> tuple[Array, Array]:
-        """Traction and tangent; releasing: points (q,) within `shear_release`."""
-        traction, tangent = self.traction_and_tangent(jump, variables)
-        if releasing is not None and releasing.any():
-            shear, slope = self.shear_release(jump, variables)
-            traction[releasing, 1:] = shear[releasing]
-            tangent[releasing, 1:, 0] = slope[releasing]
-        return traction, tangent
+    def evaluate(self, jump: Array, variables: V, releasing: BoolArray | None = None) -> Response:
+        """The response; releasing: points (q,) within `shear_release`."""
+        traction, tangent = self.response(jump, variables)
+        if releasing is None or not releasing.any():
+            return traction, tangent
+        shear, slope = self.shear_release(jump, variables)
+        traction[releasing, 1:] = shear[releasing]
+
+        def within() -> Array:
+            matrix = tangent()
+            matrix[releasing, 1:, 0] = slope[releasing]
+            return matrix
+
+        return traction, within
 
     # -- meaning of jump and internal variables
 
@@ -261,11 +274,16 @@ class SofteningLaw(Law[V]):
         """What is frozen of each point at a jump (q,): its damage, or its share of stiffness."""
         raise NotImplementedError
 
+    def response(self, jump: Array, variables: V, frozen: Array | None = None) -> Response:
+        """See `Law`."""
+        raise NotImplementedError
+
     def traction_and_tangent(
         self, jump: Array, variables: V, frozen: Array | None = None
     ) -> tuple[Array, Array]:
         """See `Law`."""
-        raise NotImplementedError
+        traction, tangent = self.response(jump, variables, frozen)
+        return traction, tangent()
 
     def secant_stiffness(self, jump: Array, variables: V, frozen: Array | None = None) -> Array:
         """See `Law`."""
@@ -291,6 +309,10 @@ class FrozenDamage(Law[V]):
     def traction_and_tangent(self, jump: Array, variables: V) -> tuple[Array, Array]:
         """See `Law`."""
         return self.law.traction_and_tangent(jump, variables, self.frozen)
+
+    def response(self, jump: Array, variables: V) -> Response:
+        """See `Law`."""
+        return self.law.response(jump, variables, self.frozen)
 
     def secant_stiffness(self, jump: Array, variables: V) -> Array:
         """See `Law`."""

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arrays import Array, BoolArray
-from .base import SofteningLaw
+from .base import Response, SofteningLaw
 from .softening import CURVES
 
 
@@ -162,37 +162,40 @@ class Bond(SofteningLaw[BondVariables]):
         damaging = np.asarray(per_slip * softens, float)
         return by_norm, by_opening, damaging, opened_rate + damaging * by_opening
 
-    def traction_and_tangent(
+    def response(
         self, jump: Array, variables: BondVariables, frozen: Array | None = None
-    ) -> tuple[Array, Array]:
+    ) -> Response:
         """See `Law`; the tangent is not symmetric."""
         step, opening = self.slip_and_damage(jump, variables, frozen), jump[:, 0]
-        per_slip = self.progress_per_slip if frozen is None else 0.0
-        by_norm, by_opening, progress_by_slip, progress_by_opening = self.slip_rates(
-            opening, variables.progress, step, per_slip
-        )
         unloading, unloading_rate = self.unloading_stiffness(step.progress)
         closed, n = opening <= 0, step.direction
-        broken = (step.progress >= self.curve.end) | (self.tensile_strength == 0)
         traction = np.empty((len(jump), 3))
         traction[:, 0] = np.where(closed, self.K_N, unloading) * opening
         traction[:, 1:] = (step.size - self.K_T * step.slip)[:, None] * n
 
-        tangent = np.empty((len(jump), 3, 3))
-        loss = opening * unloading_rate
-        bonded = unloading + loss * progress_by_opening
-        open_stiffness = np.where(broken, self.artificial * self.K_N, bonded)
-        tangent[:, 0, 0] = np.where(closed, self.K_N, open_stiffness)
-        by_slip = np.where(closed | broken, 0, loss * progress_by_slip * by_norm)
-        tangent[:, 0, 1:] = by_slip[:, None] * n
-        tangent[:, 1:, 0] = (-self.K_T * by_opening)[:, None] * n
-        remaining = self.remaining(step)  # across n, and 1 - by_norm along it
-        along = (self.K_T * (1 - by_norm - remaining))[:, None] * n
-        tangent[:, 1:, 1:] = along[:, :, None] * n[:, None, :]
-        across = self.K_T * (remaining + self.artificial)
-        tangent[:, 1, 1] += across
-        tangent[:, 2, 2] += across
-        return traction, tangent
+        def tangent_of() -> Array:
+            per_slip = self.progress_per_slip if frozen is None else 0.0
+            by_norm, by_opening, progress_by_slip, progress_by_opening = self.slip_rates(
+                opening, variables.progress, step, per_slip
+            )
+            broken = (step.progress >= self.curve.end) | (self.tensile_strength == 0)
+            tangent = np.empty((len(jump), 3, 3))
+            loss = opening * unloading_rate
+            bonded = unloading + loss * progress_by_opening
+            open_stiffness = np.where(broken, self.artificial * self.K_N, bonded)
+            tangent[:, 0, 0] = np.where(closed, self.K_N, open_stiffness)
+            by_slip = np.where(closed | broken, 0, loss * progress_by_slip * by_norm)
+            tangent[:, 0, 1:] = by_slip[:, None] * n
+            tangent[:, 1:, 0] = (-self.K_T * by_opening)[:, None] * n
+            remaining = self.remaining(step)  # across n, and 1 - by_norm along it
+            along = (self.K_T * (1 - by_norm - remaining))[:, None] * n
+            tangent[:, 1:, 1:] = along[:, :, None] * n[:, None, :]
+            across = self.K_T * (remaining + self.artificial)
+            tangent[:, 1, 1] += across
+            tangent[:, 2, 2] += across
+            return tangent
+
+        return traction, tangent_of
 
     def secant_stiffness(
         self, jump: Array, variables: BondVariables, frozen: Array | None = None

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arrays import Array, BoolArray
-from .base import SofteningLaw
+from .base import Response, SofteningLaw
 
 #: Damage at which tensile strength and cohesion are largest: the maximum of S^2/(-S').
 PEAK = (np.sqrt(1.5 / 3.5) - 0.5) / 2.5
@@ -206,20 +206,24 @@ class Endo(SofteningLaw[EndoVariables]):
 
     # -- response
 
-    def traction_and_tangent(
+    def response(
         self, jump: Array, variables: EndoVariables, frozen: Array | None = None
-    ) -> tuple[Array, Array]:
+    ) -> Response:
         """See `Law`; the tangent is symmetric."""
         alpha = self.damaged(jump, variables) if frozen is None else frozen
         at = self.plastic_return(jump, variables, alpha)
-        tangent = self.stiffness(at)
-        if frozen is None:
-            decrease = np.where(alpha > variables.alpha, at.decrease * self.energy, np.inf)
-            normal, *shear = at.decline
-            b = self.K * np.column_stack([normal, *at.in_plane(*shear)])
-            b /= np.sqrt(decrease)[:, None]
-            tangent -= b[:, :, None] * b[:, None, :]
-        return self.K * (jump - np.column_stack(at.plastic)), tangent
+
+        def tangent_of() -> Array:
+            tangent = self.stiffness(at)
+            if frozen is None:
+                decrease = np.where(alpha > variables.alpha, at.decrease * self.energy, np.inf)
+                normal, *shear = at.decline
+                b = self.K * np.column_stack([normal, *at.in_plane(*shear)])
+                b /= np.sqrt(decrease)[:, None]
+                tangent -= b[:, :, None] * b[:, None, :]
+            return tangent
+
+        return self.K * (jump - np.column_stack(at.plastic)), tangent_of
 
     def stiffness(self, at: PlasticReturn) -> Array:
         """The tangent (q, 3, 3) of the joint that flows at constant damage."""

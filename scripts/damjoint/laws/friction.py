@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Array, BoolArray
 from ..units import STRESSES, with_unit
-from .base import Evidence, Law
+from .base import Evidence, Law, Response
 
 #: Parameters of a joint that stays elastic under any load.
 UNBREAKABLE: dict[str, float | str] = {
@@ -124,16 +124,27 @@ class Friction(Law[FrictionVariables]):
     def traction_and_tangent(
         self, jump: Array, variables: FrictionVariables
     ) -> tuple[Array, Array]:
-        """See `Law`; the tangent is not symmetric."""
-        normal, size, n, slip, opened = self.trial(jump, variables)
+        """See `Law`."""
+        traction, tangent = self.response(jump, variables)
+        return traction, tangent()
+
+    def response(self, jump: Array, variables: FrictionVariables) -> Response:
+        """See `Law`."""
+        trial = self.trial(jump, variables)
         traction = np.empty((len(jump), 3))
-        traction[:, 0], traction[:, 1:] = normal, (size - self.K_T * slip)[:, None] * n
-        tangent = np.zeros((len(jump), 3, 3))
+        traction[:, 0] = trial.normal
+        traction[:, 1:] = (trial.size - self.K_T * trial.slip)[:, None] * trial.direction
+        return traction, lambda: self.tangent(trial)
+
+    def tangent(self, trial: Trial) -> Array:
+        """The tangent (q, 3, 3), which is not symmetric."""
+        _, size, n, slip, opened = trial
+        tangent = np.zeros((len(size), 3, 3))
         tangent[:, 0, 0] = self.normal_stiffness(opened)
         tangent[:, 1, 1] = tangent[:, 2, 2] = self.K_T
         slides = slip > 0
         if not slides.any():
-            return traction, tangent
+            return tangent
         across = 1 - self.K_T * slip / np.maximum(size, 1e-300)
         along = np.where(slides, self.H / (self.K_T + self.H), 1.0)
         difference = (self.K_T * (along - across))[:, None] * n
@@ -143,7 +154,7 @@ class Friction(Law[FrictionVariables]):
         tangent[:, 2, 2] += across
         coupling = -self.K_T / (self.K_T + self.H) * self.mu * self.K_N
         tangent[:, 1:, 0] = (coupling * (slides & ~opened))[:, None] * n
-        return traction, tangent
+        return tangent
 
     def secant_stiffness(self, jump: Array, variables: FrictionVariables) -> Array:
         """See `Law`: stress over jump, without coupling."""

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array, BoolArray
-from .base import SofteningLaw
+from .base import Response, SofteningLaw
 from .softening import CURVES
 
 
@@ -85,21 +85,26 @@ class Mixed(SofteningLaw[MixedVariables]):
         rate = rate / (self.L_C - self.delta_e)
         return np.where(ended, 0, stiffness), np.where(ended, 0, rate)
 
-    def traction_and_tangent(
+    def response(
         self, jump: Array, variables: MixedVariables, frozen: Array | None = None
-    ) -> tuple[Array, Array]:
+    ) -> Response:
         """See `Law`; the tangent is symmetric."""
         kappa = self.frozen_damage(jump, variables) if frozen is None else frozen
         stiffness, rate = self.secant(kappa)
-        tangent, opening = self.stiffness(jump, stiffness), jump[:, 0]
+        opening = jump[:, 0]
         traction = stiffness[:, None] * (jump * self.ratios)
         traction[:, 0] = np.where(opening <= 0, self.K_contact, stiffness) * opening
-        if frozen is None:
-            direction = jump * self.ratios
-            np.maximum(opening, 0, out=direction[:, 0])
-            growth = np.where(kappa > variables.kappa, rate / np.maximum(kappa, 1e-300), 0)
-            tangent += (growth[:, None] * direction)[:, :, None] * direction[:, None, :]
-        return traction, tangent
+
+        def tangent_of() -> Array:
+            tangent = self.stiffness(jump, stiffness)
+            if frozen is None:
+                direction = jump * self.ratios
+                np.maximum(opening, 0, out=direction[:, 0])
+                growth = np.where(kappa > variables.kappa, rate / np.maximum(kappa, 1e-300), 0)
+                tangent += (growth[:, None] * direction)[:, :, None] * direction[:, None, :]
+            return tangent
+
+        return traction, tangent_of
 
     def stiffness(self, jump: Array, secant: Array) -> Array:
         """The diagonal stiffness (q, 3, 3) at a constant kappa, at least the artificial one."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, BoolArray
-from .base import Evidence, SofteningLaw
+from .base import Evidence, Response, SofteningLaw
 from .softening import CURVES
 
 
@@ -192,19 +192,23 @@ class Rupture(SofteningLaw[RuptureVariables]):
         matrix[:, 1, 1] = matrix[:, 2, 2] = self.K_T * np.maximum(shear_share, self.artificial)
         return matrix
 
-    def traction_and_tangent(
+    def response(
         self, jump: Array, variables: RuptureVariables, frozen: Array | None = None
-    ) -> tuple[Array, Array]:
+    ) -> Response:
         """See `Law`; frozen: the remaining part of the shear stiffness."""
         opening, slip = self.opening(jump, variables), jump[:, 1:] - variables.released
         normal, slope = self.normal_response(opening, variables, frozen)
         share = self.shear_share(opening) if frozen is None else frozen
-        tangent = self.stiffness(slope, share)
-        if frozen is None and self.releases_shear:
-            tangent[:, 1:, 0] = self.shear_slope(opening)[:, None] * slip
         traction = np.empty((len(jump), 3))
         traction[:, 0], traction[:, 1:] = normal, (self.K_T * share)[:, None] * slip
-        return traction, tangent
+
+        def tangent_of() -> Array:
+            tangent = self.stiffness(slope, share)
+            if frozen is None and self.releases_shear:
+                tangent[:, 1:, 0] = self.shear_slope(opening)[:, None] * slip
+            return tangent
+
+        return traction, tangent_of
 
     def secant_stiffness(
         self, jump: Array, variables: RuptureVariables, frozen: Array | None = None

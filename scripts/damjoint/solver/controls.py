@@ -180,7 +180,7 @@ class DissipationControl(DisplacementControl):
         to_origin = self.unloading[1][:, 0] == 0
         for values in jumps, traction:
             values[to_origin, 0] = np.maximum(values[to_origin, 0], 0)
-        return jumps, traction, tangent
+        return jumps, traction, tangent()
 
     @cached_property
     def released(self) -> Array:
