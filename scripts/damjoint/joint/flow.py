@@ -477,14 +477,19 @@ class Flow:
             return other.systems[0].inverse
 
         def inverse(coupling: Array) -> Array:
-            """By the Green's function of each part; only Newton's tangent needs it."""
-            green = self._green_of_junctions(parts, known)
+            """By the Green's function of each part, for the nodes at which something couples; only
+            Newton's tangent needs it.
+            """
+            coupled: BoolArray = np.asarray(coupling.any(axis=1))
+            place = np.cumsum(coupled) - 1
+            green = self._green_of_junctions(parts, known)[:, coupled]
             for nodes, before, behind, whole in parts:
                 at, inner = self.inner[nodes[1:-1]], slice(1, -1)
-                products = np.minimum.outer(before[inner], before[inner])
-                products *= np.minimum.outer(behind[inner], behind[inner])
-                green[np.ix_(at, at)] += products / whole
-            return green @ coupling
+                some = coupled[at]
+                products = np.minimum.outer(before[inner], before[inner][some])
+                products *= np.minimum.outer(behind[inner], behind[inner][some])
+                green[np.ix_(at, place[at[some]])] += products / whole
+            return green @ coupling[coupled]
 
         def inflow() -> Array:
             entering = np.zeros(len(total))
