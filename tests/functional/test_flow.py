@@ -1,10 +1,14 @@
 """Flow through the joint: cubic law, mass balance, limits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from closed_forms import BASE, WATER, differences
 from damjoint import runner
 from damjoint.input.resolve import load
+from damjoint.model.loads import COMPLETE
+from damjoint.solver.model import Model
 from damjoint.statics import gravity
 from damjoint.statics.hints import hints
 from numpy.testing import assert_allclose
@@ -137,3 +141,18 @@ def test_a_crack_ends_the_effect_of_drains_while_it_grows_through_an_element(sol
     force = WATER * ((78 + head) / 2 * 6 + head / 2 * 54)
     assert result.last["U"] == pytest.approx(force, rel=1e-5)
     assert "in the element before the drains (6 m)" in "\n".join(hints(result))
+
+
+def test_a_trial_that_exceeds_the_most_without_the_flowing_water_has_none():
+    """Its norm shows that on the unknowns on which the water does not act; less needs the water."""
+    model = Model(load("dam", {"uplift": "flow", "n_joint": 10.0}))
+    problem, loading = model.begin(model.start(), 1.0).problem, replace(COMPLETE, level=30.0)
+    jump = 1e-4 * np.random.default_rng(1).normal(size=len(problem.stiffness))
+    whole, beside = problem.residual(jump, loading).value, problem.water.beside
+    assert 0 < beside.sum() < len(beside)
+    bound = np.linalg.norm(whole[beside])
+    least = problem.residual(jump, loading, most=0.99 * bound).value
+    assert_allclose(least[beside], whole[beside], rtol=0, atol=0)
+    assert np.abs(least - whole)[~beside].max() > 1e3 and np.linalg.norm(least) > 0.99 * bound
+    for most in (1.01 * bound, np.inf):
+        assert np.array_equal(problem.residual(jump, loading, most=most).value, whole)

@@ -169,7 +169,7 @@ def test_unstable_crack_growth_ends_in_equilibrium(solve):
 def test_the_criterion_by_which_a_solution_ends(rest, ceiling, criterion):
     """A spring of 1e12 N/m to 0.1 m with a residual [N] below the last bit of the jump, 1e-5 N."""
 
-    def evaluate(jump, level, last):
+    def evaluate(jump, level, last, most=np.inf):
         residual = 1e12 * (jump - 0.1)
         correction = lambda _secant: (-residual / 1e12, 0.0)
         return Iterate(jump, level, residual + rest, float(abs(residual + rest)[0]), correction)
@@ -197,7 +197,7 @@ def test_the_criterion_by_which_a_solution_ends(rest, ceiling, criterion):
 def test_how_a_solution_ends_that_does_not_converge(factor, message):
     """A spring whose corrections are a part of what is missing, or in the wrong direction."""
 
-    def evaluate(jump, level, last):
+    def evaluate(jump, level, last, most=np.inf):
         residual = 1e12 * (jump - 0.1)
         size = float(abs(residual)[0])
         return Iterate(jump, level, residual, size, lambda _: (-factor * residual / 1e12, 0.0))
@@ -222,7 +222,7 @@ def test_a_solution_that_does_not_come_nearer_is_given_up(residuals, message):
     """Residuals in the order of the iterations, over the loads."""
     sizes = iter(map(float, residuals))
 
-    def evaluate(jump, level, last):
+    def evaluate(jump, level, last, most=np.inf):
         size = next(sizes)
         return Iterate(jump, level, np.array([size]), size, lambda _: (np.ones(1), 0.0))
 

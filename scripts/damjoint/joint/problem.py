@@ -16,7 +16,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.linalg import norm
 
+from .. import ROUND_OFF
 from ..arrays import Array, BoolArray
 from ..csr import CsrMatrix
 from ..model.loads import LEVEL, Loading, Unknown
@@ -101,9 +103,15 @@ class JointProblem:
         return traction + self.dashpots.traction(at_points) if self.dashpots else traction
 
     def residual(
-        self, jump: Array, loading: Loading, releasing: BoolArray | None = None
+        self,
+        jump: Array,
+        loading: Loading,
+        releasing: BoolArray | None = None,
+        most: float = np.inf,
     ) -> Residual:
-        """The residual at a jump (j,) and its derivatives; releasing: see `JointLaws.evaluate`."""
+        """The residual at a jump (j,) and its derivatives; releasing: see `JointLaws.evaluate`;
+        most: if its norm exceeds this even without the flowing water, it is without that.
+        """
         interface, water, at_points = self.interface, self.water, self.jumps(jump)
         traction, tangent = self.laws.evaluate(at_points, self.variables, releasing)
         beside = list[Array]()  # stiffnesses beside that of the laws
@@ -119,8 +127,9 @@ class JointProblem:
         if self.loads:
             value = value - self.loads(loading)
         value = value + interface.forces(traction)
-        flow = water.flow(jump, loading) if water and water.flowing else None
-        if flow:
+        flow = None
+        if water and water.flowing and not self.exceeds(value, water, most):
+            flow = water.flow(jump, loading)
             value = value - flow.lift
         if self.constant is not None:
             value = value - self.constant
@@ -143,6 +152,15 @@ class JointProblem:
             return slope
 
         return Residual(value, by_jump, by_unknown)
+
+    def exceeds(self, value: Array, water: StepWater, most: float) -> bool:
+        """Whether the norm of a residual (j,) without flowing water and constant forces exceeds the
+        most where flowing water does not act.
+        """
+        beside = value[water.beside]
+        if self.constant is not None:
+            beside = beside - self.constant[water.beside]
+        return float(norm(beside)) > (1 + ROUND_OFF) * most
 
 
 def ahead(loading: Loading, size: float, unknown: Unknown) -> tuple[Loading, float]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, BoolArray
 from ..model.loads import Loading
 from .flow import FlowDerivative, FlowSolution
 from .flow_in_time import FlowInTime, StoredWater, TimeStep
@@ -48,6 +49,15 @@ class StepWater:
                 beyond = water.wetted.fields @ nodal[water.nodes]
                 lift += water.lift(loading, beyond, water.lowest(step))
         return StepFlow(water=self, jump=jump, lift=lift, solutions=solutions)
+
+    @cached_property
+    def beside(self) -> BoolArray:
+        """The unknowns (j,) on which flowing water does not act."""
+        beside = np.ones(self.joints[0].wetted.opening.shape[1], bool)
+        for system in self.flowing:
+            for water in system.members:
+                beside[water.wetted.opening.indices] = False
+        return beside
 
     @property
     def loses_pressure(self) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,8 +51,16 @@ class Iterate:
     side: NDArray[np.int_] | None = None
 
 
-#: The iterate at a jump and a level, after another one or as the first.
-Evaluate = Callable[[Array, float, Iterate | None], Iterate]
+class Evaluate(Protocol):
+    """What computes an iterate."""
+
+    def __call__(
+        self, jump: Array, level: float, last: Iterate | None, most: float = np.inf
+    ) -> Iterate:
+        """The iterate at a jump and a level, after another one or as the first; if its size exceeds
+        the most, any with a size that does.
+        """
+        ...
 
 
 @dataclass(frozen=True)
@@ -148,9 +157,11 @@ def newton(
         except (np.linalg.LinAlgError, ValueError):  # singular, or not a number
             raise NotConverged("the tangent is singular") from None
         fraction = 1.0
-        for _ in range(strategy.halvings + 1):
-            new = evaluate(now.jump + fraction * jump, now.level + fraction * level, now)
-            if new.size <= strategy.growth * now.size:
+        most = strategy.growth * now.size
+        for left in range(strategy.halvings, -1, -1):
+            at = now.jump + fraction * jump, now.level + fraction * level
+            new = evaluate(*at, now, most if left else np.inf)
+            if new.size <= most:
                 break
             fraction /= 2
         now = new

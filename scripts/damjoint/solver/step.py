@@ -103,7 +103,7 @@ def solve_from(
     strategy = begin.strategy
     unknown = constraint.unknown if constraint else LEVEL
 
-    def evaluate(jump: Array, level: float, last: Iterate | None) -> Iterate:
+    def evaluate(jump: Array, level: float, last: Iterate | None, most: float = np.inf) -> Iterate:
         side = releasing = None
         if strategy.release:
             side = problem.laws.release_side(problem.jumps(jump), problem.variables)
@@ -113,7 +113,7 @@ def solve_from(
                 side = np.where(releasing, 0, side)
         here = unknown.at(loading, level)
         known = begin.residual if last is None and jump is begin.jump else None
-        residual = known or problem.residual(jump, here, releasing)
+        residual = known or problem.residual(jump, here, releasing, most)
         size, gap = float(np.linalg.norm(residual.value)), 0.0
         if constraint:
             gap = constraint.gap(jump, here)
