@@ -27,12 +27,14 @@ from damjoint.solver.load_stepper import LoadStepper
 from damjoint.solver.path import PRECISION
 from damjoint.statics import gravity
 from damjoint.statics.verdict import highest_by_statics, verdict
+from damjoint.studies import critical as critical_module
 from damjoint.studies import failure_path
-from damjoint.studies.critical import QUICK, Search, run_to
+from damjoint.studies.critical import QUICK, Search, finished, run_to
 from damjoint.studies.critical_study import critical, printed_lines, table
+from damjoint.studies.critical_value import CriticalValue
 from damjoint.studies.critical_ways import SHORTER, Way, falls_by_water
 from damjoint.studies.critical_words import by_increments
-from damjoint.studies.failure_path import FailurePath
+from damjoint.studies.failure_path import FailurePath, brittle_in_shear
 from variants import further
 
 #: A dam of 45 m on a mesh that is fine enough for limits of the rigid block.
@@ -290,6 +292,7 @@ def test_a_limit_without_a_mechanism_is_not_confirmed(monkeypatch, command):
     monkeypatch.setattr(FailurePath, "advance_branch", lambda self: False)
     ends = lambda self, last: vars(self).update(ended=True)
     monkeypatch.setattr(FailurePath, "pass_over", ends)
+    monkeypatch.setattr(FailurePath, "rise_on", lambda self: False)
     code, out, _ = command("critical", "c", "--set", "pena_tang=0", "--levels", "6,8")
     # the interval has the highest levels of all three repetitions
     assert code == 3 and "critical level 6 m, not confirmed: between 6 and 6.625 m" in out
@@ -305,6 +308,7 @@ def test_the_end_of_a_branch_above_which_a_run_stands_is_not_confirmed(monkeypat
     )
     ends = lambda self, last: vars(self).update(ended=True)
     monkeypatch.setattr(FailurePath, "pass_over", ends)
+    monkeypatch.setattr(FailurePath, "rise_on", lambda self: False)
     monkeypatch.setattr(FailurePath, "repeated", lambda self: None)
     _, answer = search_result("c", settings={"pena_tang": 0.0}, levels="3,4")
     assert answer.growth == answer.value < 5.1 and not answer.confirmed
@@ -338,8 +342,97 @@ def test_the_level_falls_before_or_after_the_water_withdraws(levels, falls):
     """
     points = [SimpleNamespace(level=level) for level in levels]
     path = SimpleNamespace(points=points, counted=2, highest=levels[0])
-    path.water_withdraws, path.leads_higher = True, False
+    path.water_withdraws = True
     assert falls_by_water(path) == falls
+
+
+@pytest.mark.parametrize("full, stands", [(34.4, True), (33.6, False)])
+def test_a_run_with_less_uplift_does_not_stand_beyond_a_crack_whose_water_withdraws(
+    monkeypatch, full, stands
+):
+    """Where the level does not fall, no level was confirmed, though all ways agreed to 1e-6; full:
+    the highest level of the run with as much uplift as the path.
+    """
+    levels = np.array([30, full, 34.5])
+    history = SimpleNamespace(rows={"level": levels})
+    run = SimpleNamespace(stopped=True, history=history)
+    monkeypatch.setattr(critical_module, "run_to", lambda *_: run)
+    points = [SimpleNamespace(level=33.665)]
+    path = SimpleNamespace(points=points, counted=1, highest=33.665, unstable_fall=1e-3, target=60)
+    path.water_withdraws = path.leads_higher = True
+    path.has_full_uplift = lambda history: levels <= full
+    search = Search(load("dam"), "level")
+    answer = search.where_water_withdraws(path, CriticalValue(33.665, "", "", "", None))
+    assert answer.confirmed != stands
+    assert ("a run stands at 34.4 m" in answer.doubt) == stands
+    assert ("a run stands at 34.5 m, with less uplift" in answer.why) != stands
+
+
+def test_uplift_is_full_where_no_joint_has_less_than_before_the_water_withdraws():
+    """Joints with uplift 3 and 5 at most; a part 0.005 less is as much."""
+    path = SimpleNamespace(case=SimpleNamespace(joints=[1, 2]))
+    path.admissible = [SimpleNamespace(last={"U": u, "U_2": v}) for u, v in ((2, 5), (3, 4))]
+    rows = {"level": [1, 2, 3, 4], "U": [3, 2.99, 2.9, 4], "U_2": [5, 5, 6, 4.9]}
+    full = FailurePath.has_full_uplift(path, SimpleNamespace(rows=rows))
+    assert full.tolist() == [True, True, False, False]
+
+
+#: A dam of 51 m whose branch splits at 80.744 m where the next point of the joint begins to slip:
+#: increments of the process zone lead to the part on which the level falls, and filling to 80.758.
+SPLITS = {"dam_height": 50.86, "dam_base": 42.99, "dam_crest": 6.863, "n_joint": 40}
+SPLITS |= {"E": 1.683e10, "E_found": 4.768e9, "nu": 0.1413, "K_N": 8.482e11, "K_T": 4.299e11}
+SPLITS |= {"law": "bond", "sigma_max": 76940, "adhesion": 139800, "mu": 1.174, "G_f": 131.8}
+SPLITS |= {"G_t": 541.8, "softening": "exponential", "uplift": "drained", "drain_x": 3.362}
+
+
+@pytest.mark.heavy
+def test_where_the_branch_splits_the_part_is_followed_that_filling_reaches():
+    """80.7444 m was confirmed beside 80.7578 m, from another first level."""
+    search = Search(load("dam", SPLITS, "15.258,50.86"), "level")
+    path, _, _ = search.level_path()
+    assert path.highest == pytest.approx(80.757, rel=3e-5)
+    top = path.points[path.top]
+    assert not path.raised(top, PRECISION)
+
+
+#: A dam of 87 m on friction. At 89.5 m its crack parts from the reservoir, and under 95 m it is
+#: filled again.
+PARTS = {"dam_height": 87.45, "dam_base": 71.6, "dam_crest": 5.887, "n_joint": 10}
+PARTS |= {"E": 2.283e10, "E_found": 7.599e10, "nu": 0.1263, "K_N": 8.838e11, "K_T": 4.608e11}
+PARTS |= {"law": "friction", "adhesion": 457.7e3, "mu": 1.115, "uplift": "cracked"}
+
+
+@pytest.mark.heavy
+def test_levels_count_again_where_the_water_comes_back():
+    """The path ended at 89.5 m, though it goes on to 108.3 m."""
+    search = Search(load("dam", PARTS, "26.235"), "level")
+    path = search.path(26.235, search.base, 95, to_growth=True)
+    assert path.reached
+    uplifts = np.array([point.uplifts[0] for point in path.points])
+    largest = np.maximum.accumulate(uplifts)
+    assert (uplifts < 0.93 * largest).any() and uplifts[-1] > 0.995 * largest[-1]
+
+
+#: A dam of 37 m with 3.5 elements in the process zone of shear: points lose cohesion one by one.
+BRITTLE = {"dam_height": 37.18, "dam_base": 32.23, "dam_crest": 6.435, "n_joint": 20}
+BRITTLE |= {"E": 2.988e10, "E_found": 7.695e10, "nu": 0.1946, "K_N": 9.341e11, "K_T": 1.123e12}
+BRITTLE |= {"law": "bond", "sigma_max": 229e3, "adhesion": 569.8e3, "mu": 0.6904, "G_f": 165.1}
+BRITTLE |= {"G_t": 46.84, "uplift": "none"}
+
+
+@pytest.mark.heavy
+def test_elements_that_do_not_resolve_the_softening_in_shear():
+    """63.0137 m was confirmed beside 62.9871 m, by a third of the increments."""
+    _, answer = search_result("dam", settings=BRITTLE, levels="11.154,37.18")
+    assert answer.confirmed and answer.value == pytest.approx(62.983, rel=5e-5)
+
+
+def test_a_joint_is_brittle_in_shear_by_the_elements_in_its_process_zone():
+    """9 pi/32 E' G_t/c^2 over the elements, of which 5 are enough."""
+    assert brittle_in_shear(load("dam", BRITTLE))
+    assert not brittle_in_shear(load("dam", BRITTLE | {"n_joint": 30}))
+    assert not brittle_in_shear(load("dam", BRITTLE | {"G_t": 70}))
+    assert not brittle_in_shear(load("dam", {"law": "friction"}))
 
 
 @pytest.mark.heavy
@@ -354,6 +447,7 @@ def test_no_bound_of_statics_confirms_what_a_run_passes_where_water_enters(monke
     )
     ends = lambda self, last: vars(self).update(ended=True)
     monkeypatch.setattr(FailurePath, "pass_over", ends)
+    monkeypatch.setattr(FailurePath, "rise_on", lambda self: False)
     monkeypatch.setattr(FailurePath, "repeated", lambda self: None)
     settings = {"pena_tang": 0.0, "uplift": "cracked"}
     _, answer = search_result("c", settings=settings, levels=f"3,{0.975 * limit}")
@@ -384,6 +478,7 @@ def test_statics_confirms_a_level_near_its_bound(monkeypatch):
     """Only where the search does not progress; the value is that of an equilibrium."""
     monkeypatch.setattr(FailurePath, "advance", lambda self: vars(self).update(ended=True))
     monkeypatch.setattr(FailurePath, "repeated", lambda self: None)
+    monkeypatch.setattr(FailurePath, "rise_on", lambda self: False)
     monkeypatch.setattr(failure_path, "SOFTENED", np.inf)
     settings = NO_TENSION | {"n_joint": 20.0}
     _, answer = search_result("i", settings=settings, levels="9.95,10.1")
@@ -807,8 +902,7 @@ def test_a_way_from_the_same_beginning_solves_no_step_again(monkeypatch):
     monkeypatch.setattr(path.Point, "step", lambda *by: solved.append(by) or step(*by))
     search = Search(load("dam", {"law": "bond", "n_joint": 8, "order": 1}), "level")
     first = search.path(50, search.base, 80, to_growth=True)
-    first.follow(path.SURE)
-    first.refine()
+    finished(first)
     number = len(solved)
     assert number > 10 and search.from_beginning(first, Way(unstable_fall=0.0011)) is None
     assert len(solved) == number
@@ -905,6 +999,7 @@ def test_a_path_begins_as_a_run_where_single_steps_do_not_lead(monkeypatch):
     search, answer = search_result("dam", settings=RUPTURE | NO_TENSION, levels="20")
     first = search.trials[0].path
     assert first.begun_by_run and first.points[0].level == 20 and answer.value > 20
+    monkeypatch.setattr(FailurePath, "rise_on", lambda self: False)
     monkeypatch.setattr(FailurePath, "advance", lambda self: setattr(self, "ended", True))
     _, answer = search_result("dam", settings=RUPTURE | NO_TENSION, levels="20")
     assert not answer.confirmed and "falls from the first equilibrium on, at 20 m" in answer.doubt
@@ -1012,6 +1107,7 @@ def test_the_interval_has_the_highest_level_of_every_path(monkeypatch):
         return half(self)
 
     monkeypatch.setattr(FailurePath, "by_shorter", lower)
+    monkeypatch.setattr(FailurePath, "rise_on", lambda self: False)
     monkeypatch.setattr(Search, "after_growth", lambda self, path: ({}, path))
     search, answer = search_result("dam", settings=SNAP_BACKS[0])
     low, high = search.trials[-1].path.interval

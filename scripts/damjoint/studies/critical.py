@@ -45,7 +45,7 @@ from .critical_words import (
     stands_beyond,
     withdrawn,
 )
-from .failure_path import FailurePath, Trial
+from .failure_path import FailurePath, Trial, brittle_in_shear
 
 #: What is searched for beside the values of parameters.
 OF = "level", "strength", "uplift"
@@ -237,7 +237,8 @@ class Search:
         highest = max(target or 0, *case.levels)  # water may press on the crest
         interface = interface_of(replace(case, levels=(*case.levels[:-1], highest)))
         solver = {name: self.case[name] for name in QUICK}
-        path = FailurePath(case, interface, target, report, to_growth, self.rise, solver)
+        rise = self.rise / 2 if brittle_in_shear(case) else self.rise
+        path = FailurePath(case, interface, target, report, to_growth, rise, solver)
         self.trials.append(Trial(value, path))
         path.follow(self.factor)
         return path
@@ -332,7 +333,7 @@ class Search:
         and by other ways, if shorter increments have led to no other path, see `level_path`.
         """
         mechanism = bool(result.why)
-        if result.growth is None:
+        if result.growth is None and not path.water_withdraws:
             if not mechanism:
                 result = self.with_end_of(path, result)
             elif path.stops_at_water:  # the bound of statics alone is not near enough
@@ -341,13 +342,29 @@ class Search:
             ways = ways_to_confirm(first, path, result, grows, mechanism)
             paths = (self.from_beginning(path, way) for path, way in ways)
             other = next((path for path in paths if path), None)
+        if other:
+            return replace(result, why="", doubt=by_increments(other))
         if path.begun_by_run and result.point is path.points[0]:
-            result = replace(result, why="", doubt=falls_at_once(path.points[0]))
-        if path.water_withdraws:
-            words = withdrawn(path)
-            why, doubt = (words, "") if falls_by_water(path) else ("", words)
-            result = replace(result, why=why, doubt=doubt)
-        return replace(result, why="", doubt=by_increments(other)) if other else result
+            return replace(result, why="", doubt=falls_at_once(path.points[0]))
+        return self.where_water_withdraws(path, result) if path.water_withdraws else result
+
+    def where_water_withdraws(self, path: FailurePath, result: CriticalValue) -> CriticalValue:
+        """A result above which the water withdraws from the crack, and to which other ways lead:
+        confirmed where the level falls; else unless a run has a higher level with as much uplift.
+        """
+        words = withdrawn(path)
+        if path.leads_higher or not falls_by_water(path):
+            level = min((1 + ABOVE) * path.highest, path.target)
+            run = run_to(path, level)
+            if not run.stopped:
+                run = run_to(path, path.target, run)
+            levels = np.array(run.history.rows["level"])
+            full = levels[path.has_full_uplift(run.history)].max(initial=0.0)
+            if full >= level:
+                return replace(result, why="", doubt=stands_beyond(words, float(full)))
+            if levels.max() >= level:
+                words += f"; a run stands at {levels.max():.6g} m, with less uplift"
+        return replace(result, why=words, doubt="")
 
     def repeated(self, path: FailurePath) -> FailurePath | None:
         """A path by shorter increments: from before its highest level, if its branch has led there;
@@ -379,10 +396,7 @@ class Search:
             known=path if case is path.case else None,
         )
         other.unstable_fall = way.unstable_fall
-        other.follow(SURE)
-        if to_growth and other.starts:
-            other = other.first_branch()
-        other.refine()
+        other, _ = finished(other)
         differs = path.widen(other, precision)
         other.interval = path.interval
         return other if differs else None
@@ -429,9 +443,7 @@ class Search:
         stands, fails = ends
         while True:
             stands, fails = self.bisect(stands, fails)
-            fails.path.refine()
-            fails.path.follow(SURE)
-            fails.path.refine()
+            finished(fails.path)
             if not fails.stands:
                 point, path = point_at_target(stands), stands.path
                 assert path.arrival is not None
@@ -698,15 +710,21 @@ class Search:
 
 def finished(path: FailurePath) -> tuple[FailurePath, bool]:
     """A path followed to its end, or only its first branch where that ends in unstable growth, with
-    its highest level; and whether it does.
+    its highest level, from which no short rise of the level leads on; and whether it ends so.
     """
-    path.refine()  # first: a limit point that is known is confirmed sooner
-    path.follow(SURE)
-    grows = path.to_growth and (path.grows or path.ends)
-    if grows and path.starts:
-        path = path.first_branch()
-    path.refine()
-    return path, grows
+    highest = 0.0
+    while True:
+        path.refine()  # first: a limit point that is known is confirmed sooner
+        path.follow(SURE)
+        grows = path.to_growth and (path.grows or path.ends)
+        if grows and path.starts:
+            path = path.first_branch()
+        path.refine()
+        if not path.highest > highest:  # the rise before has led no further
+            return path, grows
+        highest = path.highest
+        if not path.rise_on():
+            return path, grows
 
 
 def run_to(path: FailurePath, level: float, before: LoadStepper | None = None) -> LoadStepper:

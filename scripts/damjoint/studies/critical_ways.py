@@ -58,24 +58,22 @@ def ways_to_confirm(
     # the growth of a single point may be passed over
     if (result.why and result.leads_higher) or (grows and first.releases_shear):
         ways += ((first, way) for way in over_growth(first, repeated))
-    if result.why and not result.leads_higher:
+    if (result.why or path.water_withdraws) and not result.leads_higher:
         if result.growth is None:
             further = at_end(path, repeated and path is first, mechanism)
             ways += ((path, way) for way in further)
         if first.weighed_with_water:
             ways.append((path, lower_begin(path.case)))
-    if falls_by_water(path):  # which points close again depends on the increments
+    if path.water_withdraws:  # which points close again depends on the increments
         ways += (path, lower_begin(path.case)), (path, LONGER)
     return list(dict.fromkeys(ways))
 
 
 def falls_by_water(path: FailurePath) -> bool:
-    """Whether the level of a path has fallen where the water withdraws, or falls then, and none
-    leads higher.
-    """
+    """Whether the level of a path has fallen where the water withdraws, or falls then."""
     ends = path.points[path.counted - 1], path.points[-1]
     fallen = min(point.level for point in ends) < (1 - FALL) * path.highest
-    return path.water_withdraws and fallen and not path.leads_higher
+    return path.water_withdraws and fallen
 
 
 def over_growth(path: FailurePath, repeated: bool) -> Iterator[Way]:

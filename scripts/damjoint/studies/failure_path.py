@@ -12,17 +12,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, BoolArray
 from ..input.case import Case
 from ..input.resolve import varied
 from ..input.values import has_drains
 from ..joint.interface import Interface
+from ..model import process_zone
 from ..model.loads import Loading
-from ..model.results import HISTORY, Columns, with_all_joints
+from ..model.results import HISTORY, Columns, column_of, with_all_joints
 from ..solver.controls import LevelControl
-from ..solver.history import JointState
+from ..solver.history import History, JointState
 from ..solver.load_stepper import SAME_TIME, LoadStepper
-from ..solver.path import BY_LEVEL, RISE, SURE, EquilibriumPath, Point, Solved, solve_once
+from ..solver.path import (
+    BY_LEVEL,
+    FALL,
+    PRECISION,
+    RISE,
+    SURE,
+    EquilibriumPath,
+    Point,
+    Solved,
+    solve_once,
+)
 
 #: Columns of critical.csv: a row per equilibrium of each dam that was tried. With several joints:
 #: of the first one; see `critical_columns`.
@@ -41,6 +52,8 @@ CRITICAL = {
 
 #: Part of a joint that may open or soften before a displacement is prescribed [-].
 SOFTENED = 0.1
+#: Number of elements in the process zone of shear below which its points soften one by one [-].
+FEW = 5
 #: How often a step of the level is halved at most, until its two halves lead to the same state.
 HALVINGS = 4
 
@@ -70,8 +83,6 @@ def row(point: Point) -> dict[str, float]:
 
 class FailurePath(EquilibriumPath):
     """The equilibria of a case, up to a target level or to failure."""
-
-    predicts = True
 
     def __init__(
         self,
@@ -105,6 +116,8 @@ class FailurePath(EquilibriumPath):
         self.leads_higher = False
         #: the equilibria from which the path has been continued so
         self.filled_on: list[Point] = []
+        #: its highest point, if it goes on from there with less uplift
+        self.dry_beyond: Point | None = None
         #: the part of a joint that may open or soften before a displacement is prescribed
         self.most_softened = SOFTENED * rise / RISE
         #: whether the loads of a time are those of the last one, but for the level
@@ -116,12 +129,13 @@ class FailurePath(EquilibriumPath):
         #: whether water enters the crack element by element, at each of which the level falls
         self.entering = any(joint["uplift"] == "cracked" for joint in case.joints)
         brittle = any(law.softens and law.tensile_strength > 0 for law in laws.laws)
-        #: whether a joint without tension slips point by point before it slips whole, each of which
-        #: loses its cohesion: the increments all the way decide which points are left
-        self.loses_cohesion = any(
+        #: whether a joint slips point by point before it slips whole, each of which loses its
+        #: cohesion: the increments all the way decide which points are left
+        self.loses_cohesion = brittle_in_shear(case) or any(
             law.softens and not law.tensile_strength and 0 < law.intact_cohesion < np.inf
             for law in laws.laws
         )
+        self.predicts = not brittle_in_shear(case)
         self.releases_shear = laws.releases_shear
         self.to_growth = to_growth and (self.releases_shear or (brittle and not self.entering))
         # after a step of the weight alone steps can be halved; else the first includes the weight
@@ -317,34 +331,60 @@ class FailurePath(EquilibriumPath):
         """
         while not (self.ended or self.decided(factor) or self.highest > enough):
             self.advance()
-            if not self.to_growth and (self.water_withdraws or (self.entering and self.ended)):
+            if self.leads_out and self.points[self.top] is not self.dry_beyond:
                 self.fill_on()
             if self.to_growth and self.top + 1 < len(self.points):
                 self.refine(self.points[-1].level / (1 - self.unstable_fall))  # how far it falls
         if not self.reached:
             self.refine(self.target)
 
+    @property
+    def leads_out(self) -> bool:
+        """Whether the path leads out of the crack's water, or ends where it enters."""
+        return not self.to_growth and (self.water_withdraws or (self.entering and self.ended))
+
     def fill_on(self) -> None:
         """Continue from the highest level as filling does, which lets no water out and follows no
         falling level: by relaxation at a level just above, if others follow that equilibrium; once
         from each, as the same increments follow again.
         """
-        if any(self.points[self.top] is point for point in self.filled_on):
-            self.leads_higher = True
+        top = self.points[self.top]
+        if any(top is point for point in self.filled_on):
+            self.leads_higher, self.dry_beyond = True, top
             return
-        self.filled_on = [*self.filled_on, self.points[self.top]]
+        self.filled_on = [*self.filled_on, top]
         other = self.copied()
         del other.points[self.top + 1 :]
         other.starts = [number for number in self.starts if number <= self.top]
         other.pass_to(other.relaxed(other.points[-1], range(RISES)))
-        if other.ended:
-            return
-        other.advance()
-        self.leads_higher = other.ended
         if not other.ended:
-            self.points, self.starts, self.closed = other.points, other.starts, other.closed
-            self.growth, self.over, self.crawled = other.growth, other.over, other.crawled
-            self.ended = False
+            other.advance()
+            self.leads_higher = other.ended
+        if other.ended:
+            self.dry_beyond = top
+            return
+        self.points, self.starts, self.closed = other.points, other.starts, other.closed
+        self.growth, self.over, self.crawled = other.growth, other.over, other.crawled
+        self.ended = False
+
+    def rise_on(self) -> bool:
+        """Continue from the highest level by rises of it that belong to the branch, each twice as
+        long; whether there is one. Where a branch splits, increments of a displacement may lead to
+        the part on which the level falls, and filling leads to the other one.
+        """
+        if not self.points or self.reached or self.crushed or self.unfinished:
+            return False
+        point, rise, risen = self.points[self.top], PRECISION, False
+        while True:
+            whole, middle = self.raised(point, rise), self.raised(point, rise / 2)
+            end = middle and self.raised(middle, rise / 2)
+            if not (whole and middle and end and self.agree(point, whole, middle, end)):
+                return risen
+            if not risen:
+                del self.points[self.top + 1 :]
+                self.starts = [number for number in self.starts if number < len(self.points)]
+            self.append([middle, end])
+            point, rise, risen = end, 2 * rise, True
 
     def decided(self, factor: float) -> bool:
         """Whether the target is reached, or the dam slides, is crushed or its level has settled; or
@@ -352,9 +392,14 @@ class FailurePath(EquilibriumPath):
         """
         if self.reached or self.crushed or self.slides or self.settled(factor):
             return True
-        if self.water_withdraws:
-            return True
+        if self.water_withdraws:  # it may enter again as long as the level rises
+            level, highest = self.points[-1].level, max(point.level for point in self.points)
+            return level < (1 - FALL) * highest or level > self.target
         return self.to_growth and self.grows
+
+    def settled(self, factor: float) -> bool:
+        """See `EquilibriumPath.settled`; levels with less uplift say nothing of it."""
+        return not self.water_withdraws and super().settled(factor)
 
     @property
     def water_withdraws(self) -> bool:
@@ -377,6 +422,17 @@ class FailurePath(EquilibriumPath):
             full = lower & (uplifts[:, joint] == largest[joint])
             number = min(number, int(np.argmax(full)) + 1)
         return number
+
+    def has_full_uplift(self, history: History) -> BoolArray:
+        """In which steps of a history no joint has less uplift than on the path, before the water
+        withdraws.
+        """
+        full = np.full(len(history.rows["level"]), True)
+        for joint in range(len(self.case.joints)):
+            name = column_of("U", joint)
+            largest = max(point.last[name] for point in self.admissible)
+            full &= np.array(history.rows[name]) >= (1 - WITHDRAWN) * largest
+        return full
 
     @property
     def grows(self) -> bool:
@@ -426,6 +482,14 @@ class Trial:
     def stands(self) -> bool:
         """Whether there is an equilibrium at the target level."""
         return self.path.reached
+
+
+def brittle_in_shear(case: Case) -> bool:
+    """Whether elements do not resolve the softening in shear of a joint: its points soften one by
+    one.
+    """
+    zones = map(process_zone.shear, case.joints)
+    return any(zone and zone.elements < FEW for zone in zones)
 
 
 def point_of(stepper: LoadStepper) -> Point:
