@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import ROUND_OFF
 from ..arrays import Array, BoolArray
 from ..input.case import Case
 from ..input.resolve import varied
@@ -431,7 +432,7 @@ class FailurePath(EquilibriumPath):
         for joint in range(len(self.case.joints)):
             name = column_of("U", joint)
             largest = max(point.last[name] for point in self.admissible)
-            full &= np.array(history.rows[name]) >= (1 - WITHDRAWN) * largest
+            full &= np.array(history.rows[name]) >= (1 - ROUND_OFF) * largest
         return full
 
     @property
