@@ -72,11 +72,11 @@ def test_rounds_of_the_relaxation_are_solved_as_far_as_they_count(monkeypatch):
     """To a part of the law's residual: fewer iterations, the same state after the last round."""
     stepper = LoadStepper(load("e", {"E_dam": 21e9, "n_joint": 20.0}))
     stepper.weigh()
-    found = []
+    relaxed = []
     for rough in (ROUGH, 0.0):
         monkeypatch.setattr(relaxation, "ROUGH", rough)
-        found.append(relaxation.relax(stepper.model, stepper.state, 3.0, LevelControl(8.0)))
-    (one, balanced), (whole, also) = found
+        relaxed.append(relaxation.relax(stepper.model, stepper.state, 3.0, LevelControl(8.0)))
+    (one, balanced), (whole, also) = relaxed
     assert balanced and also and one.iterations < 0.9 * whole.iterations
     np.testing.assert_allclose(one.state.jump, whole.state.jump, rtol=0, atol=1e-14)
 

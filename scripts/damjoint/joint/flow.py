@@ -481,14 +481,14 @@ class Flow:
             Newton's tangent needs it.
             """
             coupled: BoolArray = np.asarray(coupling.any(axis=1))
-            place = np.cumsum(coupled) - 1
+            column = np.cumsum(coupled) - 1
             green = self._green_of_junctions(parts, known)[:, coupled]
             for nodes, before, behind, whole in parts:
                 at, inner = self.inner[nodes[1:-1]], slice(1, -1)
                 some = coupled[at]
                 products = np.minimum.outer(before[inner], before[inner][some])
                 products *= np.minimum.outer(behind[inner], behind[inner][some])
-                green[np.ix_(at, place[at[some]])] += products / whole
+                green[np.ix_(at, column[at[some]])] += products / whole
             return green @ coupling[coupled]
 
         def inflow() -> Array:

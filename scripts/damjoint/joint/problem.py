@@ -180,9 +180,9 @@ def rate(
     for an empty reservoir, and displacement control could not start: there it is taken at a small
     level.
     """
+    further, step = ahead(loading, size, unknown)
     if unknown != LEVEL:
-        return of(unknown.at(loading, unknown.of(loading) + 1)) - of(loading)
-    step = DIFFERENCE * max(size, abs(loading.level))
+        return of(further) - of(loading)
     level = loading.level if abs(loading.level) > EMPTY * size else SMALL_LEVEL * size
     above, below = (unknown.at(loading, level + s) for s in (step, -step))
     return (of(above) - of(below)) / (2 * step)

@@ -158,9 +158,9 @@ def newton(
             raise NotConverged("the tangent is singular") from None
         fraction = 1.0
         most = strategy.growth * now.size
-        for left in range(strategy.halvings, -1, -1):
+        for remaining in range(strategy.halvings, -1, -1):
             at = now.jump + fraction * jump, now.level + fraction * level
-            new = evaluate(*at, now, most if left else np.inf)
+            new = evaluate(*at, now, most if remaining else np.inf)
             if new.size <= most:
                 break
             fraction /= 2

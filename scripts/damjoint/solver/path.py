@@ -991,8 +991,7 @@ class EquilibriumPath:
         before = self.levels[: self.top] < (1 - REPEATED) * self.highest
         begin = max([0, *np.flatnonzero(before), *(n for n in self.starts if n <= self.top)])
         lengths = [self.length(number) for number in range(begin, self.top)]
-        del again.points[begin + 1 :]
-        again.starts = [number for number in self.starts if number <= begin]
+        again.cut_after(begin)
         again.closed, again.ended = list[Point](), False
         again.growth, again.longest = 1.0, max(lengths, default=0.0) / SHORTER
         again.verified, distance = True, 0.0
@@ -1013,6 +1012,11 @@ class EquilibriumPath:
         highest = np.maximum.accumulate(levels)
         falls = np.flatnonzero(levels < (1 - self.unstable_fall) * highest)
         return float(highest[falls[0]]) if len(falls) else None
+
+    def cut_after(self, number: int) -> None:
+        """Remove the points after one of a number."""
+        del self.points[number + 1 :]
+        self.starts = [start for start in self.starts if start <= number]
 
     def insert(self, first: int, new: list[Point]) -> None:
         """Insert equilibria after a point of a number; none: no increment is of the branch."""

@@ -130,13 +130,14 @@ class FailurePath(EquilibriumPath):
         #: whether water enters the crack element by element, at each of which the level falls
         self.entering = any(joint["uplift"] == "cracked" for joint in case.joints)
         brittle = any(law.softens and law.tensile_strength > 0 for law in laws.laws)
+        coarse = brittle_in_shear(case)
         #: whether a joint slips point by point before it slips whole, each of which loses its
         #: cohesion: the increments all the way decide which points are left
-        self.loses_cohesion = brittle_in_shear(case) or any(
+        self.loses_cohesion = coarse or any(
             law.softens and not law.tensile_strength and 0 < law.intact_cohesion < np.inf
             for law in laws.laws
         )
-        self.predicts = not brittle_in_shear(case)
+        self.predicts = not coarse
         self.releases_shear = laws.releases_shear
         self.to_growth = to_growth and (self.releases_shear or (brittle and not self.entering))
         # after a step of the weight alone steps can be halved; else the first includes the weight
@@ -355,8 +356,7 @@ class FailurePath(EquilibriumPath):
             return
         self.filled_on = [*self.filled_on, top]
         other = self.copied()
-        del other.points[self.top + 1 :]
-        other.starts = [number for number in self.starts if number <= self.top]
+        other.cut_after(self.top)
         other.pass_to(other.relaxed(other.points[-1], range(RISES)))
         if not other.ended:
             other.advance()
@@ -382,8 +382,7 @@ class FailurePath(EquilibriumPath):
             if not (whole and middle and end and self.agree(point, whole, middle, end)):
                 return risen
             if not risen:
-                del self.points[self.top + 1 :]
-                self.starts = [number for number in self.starts if number < len(self.points)]
+                self.cut_after(self.top)
             self.append([middle, end])
             point, rise, risen = end, 2 * rise, True
 
