@@ -113,22 +113,27 @@ class Variables:
         return [sampling.distribution(n, text) for n, text in self.distributions.items()]
 
     def values(self, z: Sequence[float] | Array) -> dict[str, float]:
-        """The values by name at a point of the normal variables, also in far tails.
+        """The values by name at a point of the normal variables; see `values_at`."""
+        return self.values_at(np.asarray([z], float))[0]
+
+    def values_at(self, points: Array) -> list[dict[str, float]]:
+        """The values by name at points (n, variables) of the normal variables, also in far tails.
 
         Raises InputError if a parameter does not allow its value.
         """
-        result = {}
-        for name, kind, number in zip(self.names, self.marginals, z, strict=True):
-            tail = stats.norm.cdf(-abs(number))
-            value = rounded(float(kind.isf(tail) if number > 0 else kind.ppf(tail)))
+        rows: list[dict[str, float]] = [{} for _ in points]
+        for name, kind, numbers in zip(self.names, self.marginals, points.T, strict=True):
+            tails = stats.norm.cdf(-np.abs(numbers))
+            values = np.where(numbers > 0, kind.isf(tails), kind.ppf(tails))
             try:
-                result[name] = float(checked(name, value))
+                for row, value in zip(rows, values, strict=True):
+                    row[name] = float(checked(name, rounded(float(value))))
             except InputError as error:
                 raise InputError(
                     f"--vary {name}={self.distributions[name]}: has {error}; truncnorm, uniform "
                     "or lognorm keep within bounds"
                 ) from None
-        return result
+        return rows
 
     def slopes(self, z: Sequence[float] | Array) -> dict[str, float]:
         """The derivatives of the values with the normal variables, by name."""
@@ -379,7 +384,7 @@ class LimitState:
         """g (points, 1) at points; where its level is not known, the dam counts as failed. rates:
         whether levels are computed with their derivatives.
         """
-        rows = [self.levels.variables.values(z) for z in np.asarray(points)]
+        rows = self.levels.variables.values_at(np.asarray(points, float))
         results = self.levels.of(self.joint, rows, rates)
         top = self.levels.case.levels[-1]
         margins = [
