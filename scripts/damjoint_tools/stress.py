@@ -18,7 +18,6 @@ import time
 from collections.abc import Iterable, Iterator
 from concurrent.futures import as_completed
 from dataclasses import replace
-from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -215,16 +214,21 @@ def has_critical_level(scene: RandomScene) -> bool:
 
 
 def critical_levels(scene: RandomScene, folder: Path) -> tuple[list[str], dict[str, float]]:
-    """Find the critical level of a scene from three starts, and verify the state below a confirmed
-    one, and that none stands above it; returns what is found, and numbers for the row.
+    """Find the critical level of a scene from three starts below it, and verify the state below a
+    confirmed one, and that none stands above it; returns what is found, and numbers for the row.
     """
+    start = again.FIRST_START * scene.case["dam_height"]
 
-    rising = partial(scene.rising_from, again.FIRST_START * scene.case["dam_height"])
+    def rising(*levels: float) -> RandomScene:
+        return scene.rising_from(start, *levels)
 
     def search(name: str, *levels: float) -> again.Critical | None:
         return again.Critical.of(files_of(rising(*levels).critical, folder, name=name).record)
 
     first = search("critical")
+    while first and start >= min(again.STARTS) * first.level:
+        start = again.FIRST_START * first.level
+        first = search(f"critical_above_{start:g}")
     if first is None:
         return [], {}
     starts = [search(f"critical_{part:g}", part * first.level) for part in again.STARTS]

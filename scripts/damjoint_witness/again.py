@@ -25,7 +25,8 @@ SAME_STATE = 1e-6
 SAME_LEVEL = 1e-4
 #: Relative reserve of the bound within which a level is at it: the precision of the search.
 AT_THE_BOUND = 2e-3
-#: Level from which all searches rise, over the dam's height [-].
+#: Level from which all searches rise, over the dam's height, or over the critical level if this one
+#: is so low that other starts would lie below the first [-].
 FIRST_START = 0.3
 #: Levels of the second and third start, over the first critical level [-].
 STARTS = 0.6, 0.9

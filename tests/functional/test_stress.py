@@ -6,6 +6,7 @@ import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -257,6 +258,26 @@ def test_flow_in_time_is_selected_and_counted(tmp_path):
         assert counts["flow in time"] == "3" and counts["all"] == str(len(rows)) != "3"
         with_drains = [c for c in chosen if re.search(r"drains=[0,]*1", c)]
         assert counts["flow in time, with drains"] == str(len(with_drains))
+
+
+def test_a_low_critical_level_is_checked_from_levels_below_it(monkeypatch, tmp_path):
+    """Runs from a level above it found no equilibrium at 0.995 of it."""
+    scene, firsts = RandomScene({"dam_height": 30.0}, "20", "0", 1), []
+
+    def files_of(words, folder, *options, name):
+        firsts.append(float(words[words.index("--levels") + 1].split(",")[0]))
+        value = {"value": 6.0, "mode": "sliding", "joint": "", "confirmed": "so", "doubt": ""}
+        return SimpleNamespace(record={"critical": value, "verdict": "sliding"}, stopped=False)
+
+    def run_of(scene, folder, name, fields):
+        run = SimpleNamespace(files=files_of(scene.words, folder, name=name), violations=list)
+        run.request, run.steps = SimpleNamespace(sections=[]), {}
+        return run
+
+    monkeypatch.setattr(stress, "files_of", files_of)
+    monkeypatch.setattr(stress, "run_of", run_of)
+    assert stress.critical_levels(scene, tmp_path)[0] == []
+    assert firsts == pytest.approx([9.0, *[1.8] * (len(firsts) - 1)]) and len(firsts) == 8
 
 
 @pytest.mark.heavy
