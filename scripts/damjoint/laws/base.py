@@ -36,12 +36,12 @@ class Evidence:
 
 class Law(Generic[V]):
     """A law's response, internal variables V, strength and meaning; the defaults are those of an
-    elastic joint of one law-specific method, `traction_and_tangent`.
+    elastic joint, whose one method is `response`.
 
     Example:
         >>> class Springs(Law):
-        ...     def traction_and_tangent(self, jump, variables):
-        ...         return 1e10 * jump, np.broadcast_to(1e10 * np.eye(3), (len(jump), 3, 3))
+        ...     def response(self, jump, variables):
+        ...         return 1e10 * jump, lambda: np.tile(1e10 * np.eye(3), (len(jump), 1, 1))
         >>> traction, tangent = Springs({}).traction_and_tangent(np.array([[1e-3, 0, 0]]), None)
         >>> traction.tolist(), tangent.shape
         ([[10000000.0, 0.0, 0.0]], (1, 3, 3))
@@ -111,14 +111,14 @@ class Law(Generic[V]):
 
     # -- response
 
-    def traction_and_tangent(self, jump: Array, variables: V) -> tuple[Array, Array]:
-        """Traction (q, 3) and consistent tangent (q, 3, 3)."""
+    def response(self, jump: Array, variables: V) -> Response:
+        """Traction (q, 3), and what computes the consistent tangent (q, 3, 3) where needed."""
         raise NotImplementedError
 
-    def response(self, jump: Array, variables: V) -> Response:
-        """The same, the tangent where it is needed; here at once."""
-        traction, tangent = self.traction_and_tangent(jump, variables)
-        return traction, lambda: tangent
+    def traction_and_tangent(self, jump: Array, variables: V) -> tuple[Array, Array]:
+        """The response with its tangent (q, 3, 3)."""
+        traction, tangent = self.response(jump, variables)
+        return traction, tangent()
 
     def secant_stiffness(self, jump: Array, variables: V) -> Array:
         """A positive stiffness (q, 3, 3) that does not soften; here the tangent."""
@@ -278,13 +278,6 @@ class SofteningLaw(Law[V]):
         """See `Law`."""
         raise NotImplementedError
 
-    def traction_and_tangent(
-        self, jump: Array, variables: V, frozen: Array | None = None
-    ) -> tuple[Array, Array]:
-        """See `Law`."""
-        traction, tangent = self.response(jump, variables, frozen)
-        return traction, tangent()
-
     def secant_stiffness(self, jump: Array, variables: V, frozen: Array | None = None) -> Array:
         """See `Law`."""
         raise NotImplementedError
@@ -305,10 +298,6 @@ class FrozenDamage(Law[V]):
 
     def __init__(self, law: SofteningLaw[V], frozen: Array) -> None:
         self.law, self.frozen = law, frozen
-
-    def traction_and_tangent(self, jump: Array, variables: V) -> tuple[Array, Array]:
-        """See `Law`."""
-        return self.law.traction_and_tangent(jump, variables, self.frozen)
 
     def response(self, jump: Array, variables: V) -> Response:
         """See `Law`."""

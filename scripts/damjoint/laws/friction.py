@@ -121,13 +121,6 @@ class Friction(Law[FrictionVariables]):
         slip = np.where(slips, excess / (self.K_T + self.H), 0)
         return Trial(normal, size, direction, slip, opening > self.cap_opening)
 
-    def traction_and_tangent(
-        self, jump: Array, variables: FrictionVariables
-    ) -> tuple[Array, Array]:
-        """See `Law`."""
-        traction, tangent = self.response(jump, variables)
-        return traction, tangent()
-
     def response(self, jump: Array, variables: FrictionVariables) -> Response:
         """See `Law`."""
         trial = self.trial(jump, variables)
