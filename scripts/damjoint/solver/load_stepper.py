@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import asdict, dataclass, replace
@@ -17,9 +18,11 @@ from ..model.results import Info, Results
 from .controls import Control, DissipationControl, LevelControl, drive_control
 from .history import History
 from .model import Model, StepOptions, StepResult
+from .newton import Strategy
 from .path import PRECISION, ROUGH, SURE, EquilibriumPath, Point
 from .relaxation import over_unstable_growth
 from .state import State, Trace
+from .step import not_given_up
 from .trace_table import trace_table
 
 #: Times and relative lengths of steps that differ by less are the same.
@@ -93,6 +96,8 @@ class LoadStepper:
         self.leapt: tuple[tuple[float, float], ...] = ()
         #: levels before and after each step of which a half leads to no equilibrium [m]
         self.passed_over: tuple[tuple[float, float], ...] = ()
+        #: see `Plan`: of the strategies in direct steps and from relaxed states
+        self.failures = Counter[Strategy]()
         #: whether the mesh does not resolve the fracture process zone of a joint
         self.unresolved = any(map(process_zone.unresolved, self.case.joints))
         #: time of the step in which the pressure of water in time has changed most beyond the
@@ -118,6 +123,7 @@ class LoadStepper:
         other = copy(self)
         other.on_step = lambda time: None
         other.model, other.history = self.model.with_case(case), self.history.copy()
+        other.failures = self.failures.copy()
         return other
 
     # -- the loading
@@ -290,16 +296,15 @@ class LoadStepper:
         most = (1 + PRECISION) * self.slides_at
         if self.case.level_at(time) > most and self.only_level_changes(time):
             return None
-        *strategies, _ = self.model.strategies
-        quick = self.beyond_path(smallest) or (self.relaxed_at and not smallest)
-        return self.model.advance(
-            self.state,
-            time,
-            self.control(time),
-            StepOptions(
-                strategies[:1] if quick else strategies, extrapolate=True, persist=smallest
-            ),
+        first, *others, _ = self.model.strategies
+        if self.beyond_path(smallest) or (self.relaxed_at and not smallest):
+            others = []
+        elif not smallest:
+            others = not_given_up(others, self.failures)
+        options = StepOptions(
+            [first, *others], extrapolate=True, persist=smallest, failures=self.failures
         )
+        return self.model.advance(self.state, time, self.control(time), options)
 
     def leaps(self, step: StepResult) -> bool:
         """Whether a step adds a mean damage of more than LEAP to a joint, whose law depends on the
@@ -435,8 +440,9 @@ class LoadStepper:
                 return None
         if step is None and (laws.softens or equilibrium.flowing):
             accept_relaxed = laws.softens and (bool(self.relaxed_at) or smallest or cuts > 0)
+            control, failures = self.control(time), self.failures
             step, relaxed = over_unstable_growth(
-                self.model, self.state, time, self.control(time), accept_relaxed
+                self.model, self.state, time, control, accept_relaxed, failures
             )
             if step and self.leaps(step):
                 self.record_leap(self.state, step.state)

@@ -5,8 +5,9 @@ A state is immutable; any number of steps can start from it.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -72,6 +73,8 @@ class StepOptions:
     guess: tuple[Array, float] | None = None
     #: norm of the residual up to which it is solved [N], where that is larger than the tolerance
     rough: float = 0.0
+    #: see `Plan`
+    failures: Counter[Strategy] = field(default_factory=Counter)
 
 
 @dataclass(frozen=True)
@@ -113,7 +116,7 @@ class Begun:
         ]
         convergence = model.convergence
         convergence = replace(convergence, tolerance=max(convergence.tolerance, options.rough))
-        plan = Plan(starts, convergence, options.persist)
+        plan = Plan(starts, convergence, options.persist, options.failures)
         constraint = None
         if isinstance(control, DisplacementControl):
             constraint = Prescribed(control, model.equilibrium)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 
 from .controls import Control, LevelControl
 from .model import Model, StepOptions, StepResult
-from .newton import repeats
+from .newton import Strategy, repeats
 from .state import State
+from .step import not_given_up
 
 #: Most rounds of the alternate minimisation; usually fewer than 70. Then the last state is returned
 #: as one in which the law is not in equilibrium.
@@ -89,11 +91,16 @@ def relax(
 
 
 def over_unstable_growth(
-    model: Model, begin: State, time: float, control: Control, accept_relaxed: bool
+    model: Model,
+    begin: State,
+    time: float,
+    control: Control,
+    accept_relaxed: bool,
+    failures: Counter[Strategy] | None = None,
 ) -> tuple[StepResult | None, bool]:
     """A step over unstable crack growth, and whether it is the relaxed state: by Newton's method
     from that state, by the law from the last one; where it does not converge and `accept_relaxed`,
-    the relaxed state itself, if the law is in equilibrium there.
+    the relaxed state itself, if the law is in equilibrium there. failures: see `Plan`.
     """
     end = relax(model, begin, time, control)
     if end is None:
@@ -102,9 +109,11 @@ def over_unstable_growth(
     begun, jump, loading = model.begin(begin, time), relaxed.state.jump, relaxed.state.loading
     size = float(np.linalg.norm(begun.problem.residual(jump, loading).value))
     direct = model.strategies[:1] if size <= FAR * model.reference else []
-    strategies = [*direct, *model.release_strategies]
-    guess = jump, loading.level
-    step = begun.solve(control, StepOptions(strategies, persist=False, guess=guess))
+    accepted, release = accept_relaxed and balanced, model.release_strategies
+    failures = Counter() if failures is None else failures
+    strategies = [*direct, *(not_given_up(release, failures) if accepted else release)]
+    options = StepOptions(strategies, persist=False, guess=(jump, loading.level), failures=failures)
+    step = begun.solve(control, options)
     if step:
         return replace(step, iterations=relaxed.iterations + step.iterations), False
-    return (relaxed, True) if accept_relaxed and balanced else (None, False)
+    return (relaxed, True) if accepted else (None, False)
