@@ -6,7 +6,9 @@ from damjoint.engines.getdp import process
 from damjoint.input.resolve import load
 from damjoint.laws.friction import FrictionVariables
 from damjoint.mesh.mesh import mesh_of
+from damjoint.solver.controls import LevelControl
 from damjoint.solver.load_stepper import LoadStepper
+from damjoint.solver.model import Model
 from damjoint.solver.newton import Convergence, Iterate, NotConverged, Strategy, newton
 from damjoint.statics.verdict import verdict
 from variants import further
@@ -270,6 +272,26 @@ def test_a_strategy_that_has_not_helped_three_times_is_kept_for_the_smallest_ste
     for strategy in stepper.model.strategies[1:-1]:
         levels = [level for way, level in tried if way == strategy and level > 0]
         assert levels[:4] == [30, 30 / 4, 30 / 16, 30 / 1024]
+
+
+def test_a_run_that_would_stop_relaxes_in_steps_that_are_longer_than_the_smallest(monkeypatch):
+    """One of 8/1024 leads on, and those of 1/1024 to 4/1024 do not."""
+    stepper, times = LoadStepper(load("dam", {"n_joint": 5, "law": "rupture"}, "30,40")), []
+    for _ in stepper.steps_to(1):
+        pass
+    reached = stepper.model.advance(stepper.state, 1 + 8 / 1024, LevelControl(30 + 80 / 1024))
+
+    def over_unstable_growth(model, begin, time, *_):
+        times.append((time - 1) * 1024)
+        return (reached, True) if times[-1] == 8 else (None, False)
+
+    growth = "damjoint.solver.load_stepper.over_unstable_growth"
+    monkeypatch.setattr(growth, over_unstable_growth)
+    monkeypatch.setattr(Model, "advance", lambda *_: None)
+    next(stepper.steps_to(2))
+    assert times == [1024, 256, 64, 16, 4, 1, 2, 4, 8]
+    assert stepper.state.time == 1 + 8 / 1024 and not stepper.stopped
+    assert stepper.relaxed_at == (reached.state.loading.level,)
 
 
 def test_a_run_that_stops_says_how_its_last_solution_ended(solve):

@@ -37,6 +37,9 @@ GROWS = 0.02
 #: Mean difference of the damage of a joint up to which two states are the same [-].
 SAME_DAMAGE = 0.02
 
+#: Powers of 2 of the lengths over the smallest step at which a run that would stop relaxes.
+POWERS_BEYOND = range(1, 5)
+
 #: Number of strategies by which a step from the equilibrium path to the prescribed level is tried.
 FROM_PATH = 2
 
@@ -416,11 +419,30 @@ class LoadStepper:
                 step = step or self.model.advance(self.state, time, self.control(time), options)
             if step is None and self.path_ended and self.state is not self.path_begin:
                 step = self.along_path(target)
+            if step is None and self.mechanism is None and not self.drives:
+                step = self.relaxed_beyond(target)
             self.end_of_solution = "" if step or self.mechanism else end
             if step and self.leaps(step):
                 self.record_leap(self.state, step.state)
         self.stopped = step is None
         return step
+
+    def relaxed_beyond(self, target: float) -> StepResult | None:
+        """A step of a few of the smallest ones, up to a target, over unstable crack growth by
+        relaxation: at the smallest one it may fail by chance.
+        """
+        if not self.model.equilibrium.laws.softens:
+            return None
+        for power in POWERS_BEYOND:
+            time = min(self.state.time + 2**power * self.case["smallest_step"], target)
+            step, relaxed = over_unstable_growth(
+                self.model, self.state, time, self.control(time), True, self.failures
+            )
+            if step and relaxed:
+                self.relaxed_at += (step.state.loading.level,)
+            if step or time == target:
+                return step
+        return None
 
     # -- beyond a limit point
 
