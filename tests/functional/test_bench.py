@@ -11,12 +11,23 @@ from damjoint_tools import bench_commands, bench_cost, bench_hard, bench_page
 from damjoint_tools.bench_table import Measurements
 
 
+#: Modelings whose times are measured, one of them in 3D.
+MODELINGS = "aceh"
+#: Part of an earthquake, on a coarse mesh.
+QUAKES = {"2D, order 1, 0.5 s": ({"order": 1.0, "n_joint": 20.0}, 0.5)}
+
+
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
-    """The log of the short benchmark, with less hard scenes: its parts are measured once."""
+    """The log of the short benchmark, with less hard scenes, modelings and a coarser earthquake:
+    its parts are measured once.
+    """
+    published = {name: bench_cost.PUBLISHED[name] for name in MODELINGS}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(bench_hard, "NAMED", {"e": ("e", {"E_dam": 60e9})})
         patch.setattr(bench_hard, "FEW", 2)
+        patch.setattr(bench_cost, "PUBLISHED", published)
+        patch.setattr(bench_commands, "QUAKES", QUAKES)
         yield tmp_path_factory.mktemp("bench") / "measured.jsonl"
 
 
@@ -85,7 +96,7 @@ def test_the_short_benchmark_writes_consistent_files(command, tmp_path, log):
     assert text.startswith("# Benchmarks\n") and text.count("\n## ") == 16
     assert (tmp_path / "bench" / "accuracy.png").read_bytes()[:4] == b"\x89PNG"
     *lines, blank, source = (tmp_path / "bench" / "modelings.md").read_text().splitlines()
-    assert len(lines) == 13 and not blank and source in text
+    assert len(lines) == 2 + len(MODELINGS) and not blank and source in text
     origin = json.loads((tmp_path / "bench" / "provenance.json").read_text())
     assert source.startswith(f"Measured with damjoint {origin['version']} (")
     assert origin["date"] in source and origin["machine"] in source and origin["commit"] in source
@@ -94,7 +105,7 @@ def test_the_short_benchmark_writes_consistent_files(command, tmp_path, log):
         with (tmp_path / "bench" / f"{name}.csv").open() as file:
             return list(csv.DictReader(file))
 
-    assert [row["case"] for row in table("cases")] == [*"abcdefghijk", "sum"]
+    assert [row["case"] for row in table("cases")] == [*MODELINGS, "sum"]
     for row in table("recommended"):
         assert float(row["coarse: error [%]"]) < 3, row
     errors = {
