@@ -49,8 +49,9 @@ def law_of_joint(rows: Table, values: Values, prefix: str) -> Iterator[str]:
             *row, damage, slip = history[n]
             jump = (row[0], row[1], row[2])
             point.step(jump, begin, end, frozen)
-            after = copy(point)
+            after = point
             if frozen:  # with the damage that the step has done the point may slip further
+                after = copy(point)
                 after.step(jump, end, end, False)
             exact = after.traction(jump)
             size = point.K_N * abs(jump[0]) + point.K_T * hypot(jump[1], jump[2])

@@ -77,10 +77,13 @@ def test_results_of_condensed_bodies(both, law, uplift):
 
 
 @pytest.mark.heavy
-def test_a_mechanism_stops_at_the_same_level(both):
+def test_a_mechanism_stops_at_the_same_level():
     """The limit point of an equilibrium path has the path's precision."""
     settings = SOLID | WEAK["bond"] | {"uplift": "imposed", "mu": 0.4, "adhesion": 6e4}
-    one, other = histories(both, load("dam", settings, "20,30,40,45"))
+    coarse = {"order": 1.0, "n_joint": 5.0, "n_layers": 2.0, "h_dam": 12.0, "h_found": 40.0}
+    case = load("dam", settings | coarse, "20,30,40,45")
+    bodies = Bodies.of(case)
+    one, other = histories([make(case, bodies) for make in (condense, keep)], case)
     assert one.stopped and other.stopped
     assert one.info["mechanism"]["mode"] == other.info["mechanism"]["mode"] == "sliding"
     levels = [result.history["level"][-1] for result in (one, other)]
