@@ -10,7 +10,6 @@ import pytest
 from damjoint_tools import bench_commands, bench_cost, bench_hard, bench_page
 from damjoint_tools.bench_table import Measurements
 
-
 #: Modelings whose times are measured, one of them in 3D.
 MODELINGS = "aceh"
 #: Part of an earthquake, on a coarse mesh.
