@@ -97,7 +97,7 @@ def test_a_mechanism_stops_at_the_same_level():
         ("dam", SOLID | WEAK["friction"] | {"order": 2.0, "n_joint": 5.0}, "30,40"),
         ("dam", SOLID | WEAK["friction"] | {"lift_heights": (20.0,), "hold_z": 1.0}, "30,40"),
         # (only up to where sliding on many joints has a single equilibrium)
-        ("valley_blocks", {"n_joint": 6.0, "h_dam": 12.0, "h_found": 40.0}, "20,30"),
+        ("valley_blocks", {"n_joint": 5.0, "h_dam": 16.0, "h_found": 60.0}, "20,30"),
     ],
 )
 def test_order_2_lifts_and_joints_that_meet(name, settings, levels):
