@@ -237,26 +237,6 @@ def test_a_solution_that_does_not_come_nearer_is_given_up(residuals, message):
         newton(evaluate, start, convergence, strategy)
 
 
-@pytest.mark.parametrize(("fall", "by_secant"), [(1e-6, 26), (0.01, 200)])
-def test_iterations_by_the_secant_end_where_a_joint_slides(fall, by_secant):
-    """Each reduces the residual by a part; from then on the tangent, which leads to zero."""
-    taken = list[bool]()
-
-    def iterate(size):
-        def correction(secant):
-            taken.append(secant)
-            return np.array([fall * size if secant else size]), 0.0
-
-        return Iterate(np.array([1 - size]), 0.0, np.array([size]), size, correction)
-
-    def evaluate(jump, level, last, most=np.inf):
-        return iterate(1 - float(jump[0]))
-
-    convergence = Convergence(1.0, 1e-9, 0.0, 5.0, 10.0)
-    newton(evaluate, iterate(1.0), convergence, Strategy(3.0, 200, 0, 300, 4))
-    assert taken == [True] * by_secant + [False]
-
-
 def test_a_strategy_that_has_not_helped_three_times_is_kept_for_the_smallest_step(monkeypatch):
     """None converges: the step is cut to a quarter, and to a quarter, and so on, to 1/1024."""
     tried = []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -110,10 +109,6 @@ STAGNATION = 1e-6
 #: Number of iterations over which it does.
 STAGNATING_ITERATIONS = 4
 
-#: Part of the residual by which each of so many iterations by the secant stiffness has to reduce
-#: it, or they are the last ones: a joint slides, and more of them move it further.
-SLIDES, SLIDING_ITERATIONS = 0.005, 25
-
 #: Relative difference of residuals below which two iterates are the same [-], and Newton's method
 #: has come back to one of them: above the rounding of a norm, far below any progress.
 SAME = 1e-10
@@ -147,22 +142,18 @@ def newton(
     while points open or break the residual has to rise, which a monotone line search prevents.
     """
     now, sizes = start, list[float]()
-    secant = strategy.secant
     while True:
         iterations = len(sizes)
         criterion = convergence.reached(now, sizes[-1] if sizes else np.inf, evaluate)
         if criterion:
             return now, iterations, criterion
-        if iterations < secant and slides(sizes):
-            secant = iterations
-        left = strategy.iterations - strategy.secant + secant
-        if end := stop_reason(now, sizes, left, strategy.patience):
+        if end := stop_reason(now, sizes, strategy):
             raise NotConverged(end.format(now.size / (convergence.reference or 1.0)))
         if np.abs(now.jump).max() > convergence.largest_jump:
             raise Diverged(f"a displacement jump exceeds {convergence.largest_jump:.3g} m")
         sizes.append(now.size)
         try:
-            jump, level = now.correction(iterations < secant)
+            jump, level = now.correction(iterations < strategy.secant)
         except (np.linalg.LinAlgError, ValueError):  # singular, or not a number
             raise NotConverged("the tangent is singular") from None
         fraction = 1.0
@@ -176,20 +167,10 @@ def newton(
         now = new
 
 
-def slides(sizes: list[float]) -> bool:
-    """Whether none of the last iterations by the secant stiffness has reduced the residual, whose
-    norms are these: a joint that slides moves by the same amount in each.
-    """
-    last = sizes[-SLIDING_ITERATIONS - 1 :]
-    return len(last) > SLIDING_ITERATIONS and all(
-        after > (1 - SLIDES) * before for before, after in pairwise(last)
-    )
-
-
-def stop_reason(now: Iterate, sizes: list[float], most: int, patience: float) -> str:
+def stop_reason(now: Iterate, sizes: list[float], strategy: Strategy) -> str:
     """Why an iterate that has not converged is the last one; empty if it is not.
 
-    sizes: norms of the residual before it; most: iterations; patience: see `Strategy`.
+    sizes: norms of the residual before it.
     """
     if not np.isfinite(now.size):
         return "the residual is not a finite number"
@@ -201,9 +182,9 @@ def stop_reason(now: Iterate, sizes: list[float], most: int, patience: float) ->
         return "the residual stagnates at {:.2g} of the loads"
     all_sizes = [*sizes, now.size]
     since = len(sizes) - all_sizes.index(min(all_sizes))
-    if since >= patience:
+    if since >= strategy.patience:
         return f"{since} iterations have not reduced the residual, {{:.2g}} of the loads"
-    if len(sizes) == most:
+    if len(sizes) == strategy.iterations:
         return f"after {len(sizes)} iterations the residual is {{:.2g}} of the loads"
     return ""
 
