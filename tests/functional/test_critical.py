@@ -27,9 +27,8 @@ from damjoint.solver.load_stepper import LoadStepper
 from damjoint.solver.path import PRECISION
 from damjoint.statics import gravity
 from damjoint.statics.verdict import highest_by_statics, verdict
-from damjoint.studies import critical as critical_module
 from damjoint.studies import failure_path
-from damjoint.studies.critical import QUICK, Search, finished, run_to
+from damjoint.studies.critical import QUICK, Search, finished
 from damjoint.studies.critical_study import critical, printed_lines, table
 from damjoint.studies.critical_value import CriticalValue
 from damjoint.studies.critical_ways import SHORTER, Way, falls_by_water
@@ -347,25 +346,54 @@ def test_the_level_falls_before_or_after_the_water_withdraws(levels, falls):
 
 
 @pytest.mark.parametrize("full, stands", [(34.4, True), (33.6, False)])
-def test_a_run_with_less_uplift_does_not_stand_beyond_a_crack_whose_water_withdraws(
-    monkeypatch, full, stands
-):
+def test_a_run_with_less_uplift_does_not_stand_beyond_a_crack_whose_water_withdraws(full, stands):
     """Where the level does not fall, no level was confirmed, though all ways agreed to 1e-6; full:
     the highest level of the run with as much uplift as the path.
     """
     levels = np.array([30, full, 34.5])
     history = SimpleNamespace(rows={"level": levels})
     run = SimpleNamespace(stopped=True, history=history)
-    monkeypatch.setattr(critical_module, "run_to", lambda *_: run)
     points = [SimpleNamespace(level=33.665)]
     path = SimpleNamespace(points=points, counted=1, highest=33.665, unstable_fall=1e-3, target=60)
     path.water_withdraws = path.leads_higher = True
     path.has_full_uplift = lambda history: levels <= full
+    path.run_to = lambda *_: run
     search = Search(load("dam"), "level")
     answer = search.where_water_withdraws(path, CriticalValue(33.665, "", "", "", None))
     assert answer.confirmed != stands
     assert ("a run stands at 34.4 m" in answer.doubt) == stands
     assert ("a run stands at 34.5 m, with less uplift" in answer.why) != stands
+
+
+@pytest.mark.parametrize("opens", [True, False])
+def test_a_branch_that_ends_where_water_enters_ends_in_unstable_crack_growth(opens):
+    """All first levels lead to the end of the branch, 28.6553 m, and a run stands at 30.074 m with
+    less uplift: it was not confirmed.
+    """
+    run = SimpleNamespace(stopped=False, history=SimpleNamespace(rows={"level": [28.6, 30.074]}))
+    path = SimpleNamespace(highest=28.6553, target=39, interval=(np.nan, np.nan))
+    path.to_growth, path.run_to, path.opens_beyond = False, lambda *_: run, lambda _: opens
+    search = Search(load("dam"), "level")
+    search.levels_after = True
+    answer = search.with_run(path, CriticalValue(28.6553, "sliding", "the branch ends", "", None))
+    assert answer.confirmed == opens and answer.stands_at == 30.074
+    assert (answer.mode == "unstable crack growth") == opens and answer.growth == 28.6553
+
+
+@pytest.mark.heavy
+def test_a_path_is_continued_from_a_run_where_water_enters():
+    """Each element that the water enters turns the path, which ended at 80.11 m, while runs stand
+    above, with as much uplift: no level was confirmed. The whole joint slips at 84.03 m.
+    """
+    section = {"dam_height": 56.63, "dam_base": 52.15, "dam_crest": 7.059, "n_joint": 20}
+    joint = {"K_N": 6.984e11, "K_T": 4.486e11, "adhesion": 437.9e3, "sigma_max": 593.7e3}
+    joint |= {"law": "friction", "mu": 1.161, "uplift": "cracked", "drains": 1, "drain_x": 5.163}
+    concrete = {"E": 2.95e10, "E_found": 4.137e9, "nu": 0.1463}
+    search = Search(load("dam", section | joint | concrete, "16.989", "0"), "level")
+    path, _ = finished(search.path(16.989, search.base, 100.0, to_growth=True))
+    begin = next(point for point in path.points if len(point.model.case.levels) > 1)
+    assert begin.level < 80.2 and path.has_full_uplift(path.points[path.top].history)[-1]
+    assert path.ran_on and path.slides and path.highest == pytest.approx(84.0267, rel=1e-4)
 
 
 def test_uplift_is_full_where_no_joint_has_less_than_before_the_water_withdraws():
@@ -450,6 +478,7 @@ def test_no_bound_of_statics_confirms_what_a_run_passes_where_water_enters(monke
     ends = lambda self, last: vars(self).update(ended=True)
     monkeypatch.setattr(FailurePath, "pass_over", ends)
     monkeypatch.setattr(FailurePath, "rise_on", lambda self: False)
+    monkeypatch.setattr(FailurePath, "run_on", lambda self: False)
     monkeypatch.setattr(FailurePath, "repeated", lambda self: None)
     settings = {"pena_tang": 0.0, "uplift": "cracked"}
     _, answer = search_result("c", settings=settings, levels=f"3,{0.975 * limit}")
@@ -986,7 +1015,7 @@ def test_a_run_within_a_search_has_the_iterations_of_a_run(monkeypatch):
     steps_to = LoadStepper.steps_to
     watched = lambda self, target: runs.append(self.case) or steps_to(self, target)
     monkeypatch.setattr(LoadStepper, "steps_to", watched)
-    run_to(along, 46.0)
+    along.run_to(46.0)
     along.begin_by_run()
     expected = load("dam", settings)
     assert len(runs) > 1

@@ -24,14 +24,13 @@ from ..input.resolve import resolve, varied
 from ..joint.interface import interface_of
 from ..model.results import Results, row_of_joint
 from ..session import study_end
-from ..solver.load_stepper import LoadStepper
 from ..solver.path import PRECISION, RISE, ROUGH, SURE, Point
 from ..statics.statement import REASONS, words_of_bound
 from ..statics.verdict import bound, highest_by_statics
 from ..threads import limited_threads
 from ..units import FORCES, STRESSES, with_unit
 from .critical_gravity import GravityValues
-from .critical_value import AFTER_GROWTH, CriticalValue
+from .critical_value import CriticalValue
 from .critical_ways import SHORTER, Way, falls_by_water, repeats_whole, ways_to_confirm
 from .critical_words import (
     beyond_limit,
@@ -45,7 +44,7 @@ from .critical_words import (
     stands_beyond,
     withdrawn,
 )
-from .failure_path import FailurePath, Trial, brittle_in_shear
+from .failure_path import ABOVE, FailurePath, Trial, brittle_in_shear
 
 #: What is searched for beside the values of parameters.
 OF = "level", "strength", "uplift"
@@ -72,10 +71,6 @@ AFTER = {"by displacement": False, "by relaxation": True}
 
 #: The mode of a level at which a crack grows unstably, and beyond which there are equilibria.
 GROWTH = "unstable crack growth"
-
-#: Relative distance from the end of a branch to the level above it that a run must not reach: up
-#: to it, highest levels after unstable growth are the same.
-ABOVE = AFTER_GROWTH
 
 #: Relative distance within which the bound of statics confirms a critical level below it.
 NEAR_BOUND = 0.02
@@ -355,9 +350,9 @@ class Search:
         words = withdrawn(path)
         if path.leads_higher or not falls_by_water(path):
             level = min((1 + ABOVE) * path.highest, path.target)
-            run = run_to(path, level)
+            run = path.run_to(level)
             if not run.stopped:
-                run = run_to(path, path.target, run)
+                run = path.run_to(path.target, run)
             levels = np.array(run.history.rows["level"])
             full = levels[path.has_full_uplift(run.history)].max(initial=0.0)
             if full >= level:
@@ -676,19 +671,20 @@ class Search:
         level = path.target
         if self.of == "level":
             level = min((1 + ABOVE) * path.highest, level)
-        run = run_to(path, level)
+        run = path.run_to(level)
         if run.stopped:
             comes_near = run.state.loading.level > (1 - ABOVE) * path.highest
             near_drains = path.loses_drains and not comes_near
             return replace(result, why="", doubt=end_at_drains(path)) if near_drains else result
+        grows = path.to_growth or path.opens_beyond(run.history)
         if self.of == "level" and self.levels_after:  # up to where it stands
-            level = max(run_to(path, path.target, run).history.rows["level"])
+            level = max(path.run_to(path.target, run).history.rows["level"])
         beyond = stands_beyond(result.why, level)
         known = path.interval[1] > level  # from a path by other increments
         result = replace(result, why="", doubt=by_increments(path) if known else beyond)
         if self.of != "level":
             return result
-        if path.to_growth:
+        if grows:
             result = replace(result, mode=GROWTH, why=beyond, doubt="")
         return replace(result, growth=path.highest, stands_at=float(level))
 
@@ -710,7 +706,8 @@ class Search:
 
 def finished(path: FailurePath) -> tuple[FailurePath, bool]:
     """A path followed to its end, or only its first branch where that ends in unstable growth, with
-    its highest level, from which no short rise of the level leads on; and whether it ends so.
+    its highest level, from which no short rise of the level and no run leads on; and whether it
+    ends so.
     """
     highest = 0.0
     while True:
@@ -723,25 +720,8 @@ def finished(path: FailurePath) -> tuple[FailurePath, bool]:
         if not path.highest > highest:  # the rise before has led no further
             return path, grows
         highest = path.highest
-        if not path.rise_on():
+        if not (path.rise_on() or path.run_on()):
             return path, grows
-
-
-def run_to(path: FailurePath, level: float, before: LoadStepper | None = None) -> LoadStepper:
-    """A run from the beginning of a path to a level [m], by all strategies of a run, or the one
-    before to a lower level, continued.
-    """
-    case, solver = before.case if before else path.case, path.solver
-    levels, tails = tuple(min(known, level) for known in case.levels), case.tail_levels
-    if levels[-1] < level:
-        levels, tails = (*levels, level), (*tails, tails[-1])
-    case = varied(case, solver, levels, tails)
-    run = before.fork(case) if before else LoadStepper(case, path.interface)
-    run.predicts = path.predicts
-    for state in run.steps():
-        if run.path_ended and state.loading.level > (1 - PRECISION) * path.highest:
-            run.path_begin = state  # both paths have ended: no other one is begun from there
-    return run
 
 
 def of_each(values: list[float]) -> Setting:

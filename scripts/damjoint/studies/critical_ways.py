@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..input.case import Case
 from ..solver.path import FALL
@@ -55,8 +55,9 @@ def ways_to_confirm(
     unstably there; mechanism: whether a mechanism confirms it.
     """
     repeated, ways = repeats_whole(first), list[tuple[FailurePath, Way]]()
+    grows_unstably, enters = bool(result.why) and result.leads_higher, path.entering
     # the growth of a single point may be passed over
-    if (result.why and result.leads_higher) or (grows and first.releases_shear):
+    if (grows_unstably and not enters) or (grows and first.releases_shear):
         ways += ((first, way) for way in over_growth(first, repeated))
     if (result.why or path.water_withdraws) and not result.leads_higher:
         if result.growth is None:
@@ -64,8 +65,11 @@ def ways_to_confirm(
             ways += ((path, way) for way in further)
         if first.weighed_with_water:
             ways.append((path, lower_begin(path.case)))
-    if path.water_withdraws:  # which points close again depends on the increments
+    # which points the water reaches, and which ones close again, depends on the increments
+    if path.water_withdraws or (path.ran_on and not path.slides):
         ways += (path, lower_begin(path.case)), (path, LONGER)
+    elif grows_unstably and enters and not first.to_growth:  # long ones may pass it over
+        ways.append((path, replace(lower_begin(path.case), share=SHORTER.share)))
     return list(dict.fromkeys(ways))
 
 
@@ -102,7 +106,7 @@ def at_end(path: FailurePath, repeated: bool, mechanism: bool) -> Iterator[Way]:
     """
     if not path.to_growth and path.growth_until(path.top + 1) is not None:
         yield from over_growth(path, repeated)
-    elif path.entering and path.branch_ends and not mechanism:
+    elif path.entering and not mechanism:
         yield lower_begin(path.case)
 
 

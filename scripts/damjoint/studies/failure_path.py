@@ -35,6 +35,7 @@ from ..solver.path import (
     Solved,
     solve_once,
 )
+from .critical_value import AFTER_GROWTH
 
 #: Columns of critical.csv: a row per equilibrium of each dam that was tried. With several joints:
 #: of the first one; see `critical_columns`.
@@ -62,6 +63,10 @@ HALVINGS = 4
 RISES = 4
 #: The part of the uplift by which it falls under a rising level where the water withdraws.
 WITHDRAWN = 0.005
+
+#: Relative distance from the end of a path to the level above it that a run must not reach: up to
+#: it, highest levels after unstable growth are the same.
+ABOVE = AFTER_GROWTH
 
 #: Time of an increment of displacement, after the last level, where all loads act in full.
 TICK = 1e-3
@@ -119,6 +124,10 @@ class FailurePath(EquilibriumPath):
         self.filled_on: list[Point] = []
         #: its highest point, if it goes on from there with less uplift
         self.dry_beyond: Point | None = None
+        #: whether it has been continued from a run, see `run_on`
+        self.ran_on = False
+        #: the runs from the beginning, by the level to which they were to lead
+        self.runs = dict[float, LoadStepper]()
         #: the part of a joint that may open or soften before a displacement is prescribed
         self.most_softened = SOFTENED * rise / RISE
         #: whether the loads of a time are those of the last one, but for the level
@@ -129,6 +138,8 @@ class FailurePath(EquilibriumPath):
         laws = stepper.model.equilibrium.laws
         #: whether water enters the crack element by element, at each of which the level falls
         self.entering = any(joint["uplift"] == "cracked" for joint in case.joints)
+        #: whether a law softens, in tension or in shear
+        self.softens = any(law.softens for law in laws.laws)
         brittle = any(law.softens and law.tensile_strength > 0 for law in laws.laws)
         coarse = brittle_in_shear(case)
         #: whether a joint slips point by point before it slips whole, each of which loses its
@@ -386,6 +397,49 @@ class FailurePath(EquilibriumPath):
             self.append([middle, end])
             point, rise, risen = end, 2 * rise, True
 
+    def run_on(self) -> bool:
+        """Continue from a run that stands just above the highest level, with no less uplift, where
+        water enters the crack and the path has led to no mechanism; whether there is one. The path
+        has ended at a point that the water reaches, and filling leads over it; with a law that
+        softens only where the water withdraws: else a crack grows unstably there.
+        """
+        shown = self.reached or self.crushed_at_top or self.slides or self.ends_at_strength
+        leads_over = self.water_withdraws or not self.softens
+        if shown or self.to_growth or not (self.entering and leads_over):
+            return False
+        top, run = self.points[self.top], self.run_to(min((1 + ABOVE) * self.highest, self.target))
+        if run.stopped or not self.has_full_uplift(run.history)[-1]:
+            return False
+        by = float(np.abs(run.state.jump - top.state.jump).max())
+        end = Point(run.model, run.state, run.history.copy(), self.imposed(top) + by, "level")
+        other = self.copied()
+        other.cut_after(self.top)
+        other.pass_to(end)
+        other.follow(SURE)
+        higher = other.highest > self.highest  # no level counts after which the water withdraws
+        if higher:
+            vars(self).update(vars(other), ran_on=True)
+        return higher
+
+    def run_to(self, level: float, before: LoadStepper | None = None) -> LoadStepper:
+        """A run from the beginning to a level [m], by all strategies of a run, or the one before to
+        a lower level, continued.
+        """
+        if level in self.runs:
+            return self.runs[level]
+        case = before.case if before else self.case
+        levels, tails = tuple(min(known, level) for known in case.levels), case.tail_levels
+        if levels[-1] < level:
+            levels, tails = (*levels, level), (*tails, tails[-1])
+        case = varied(case, self.solver, levels, tails)
+        run = before.fork(case) if before else LoadStepper(case, self.interface)
+        run.predicts = self.predicts
+        for state in run.steps():
+            if run.path_ended and state.loading.level > (1 - PRECISION) * self.highest:
+                run.path_begin = state  # both paths have ended: no other one is begun from there
+        self.runs[level] = run
+        return run
+
     def decided(self, factor: float) -> bool:
         """Whether the target is reached, or the dam slides, is crushed or its level has settled; or
         a crack has grown unstably, if that is to be found.
@@ -433,6 +487,12 @@ class FailurePath(EquilibriumPath):
             largest = max(point.last[name] for point in self.admissible)
             full &= np.array(history.rows[name]) >= (1 - ROUND_OFF) * largest
         return full
+
+    def opens_beyond(self, history: History) -> bool:
+        """Whether a crack that water enters has grown unstably in a run beyond the highest level:
+        its law softens, or it has less uplift than here; else `run_on` leads on.
+        """
+        return self.entering and (self.softens or not self.has_full_uplift(history)[-1])
 
     @property
     def grows(self) -> bool:
