@@ -98,6 +98,21 @@ def test_a_dam_on_a_brittle_bond_is_followed_beyond_its_limit_point(solve):
     assert result.last["crest_ux"] == pytest.approx(unbonded.last["crest_ux"], rel=0.05)
 
 
+def test_a_long_step_of_the_level_does_not_lead_to_the_falling_part_of_a_branch():
+    """That from 7.2 to 24.07 m and its halves led to it: no level above had an equilibrium, and
+    24.07 m was said to be the level of unstable growth, which is 24.413 m.
+    """
+    section = {"dam_height": 24.07, "dam_base": 21.77, "dam_crest": 1.885, "n_joint": 20}
+    joint = {"law": "rupture", "sigma_max": 432.8e3, "pena_rupture": 0.6371, "alpha": 0.5}
+    joint |= {"K_N": 8.308e11, "K_T": 8.951e11, "uplift": "cracked"}
+    concrete = {"E": 2.086e10, "E_found": 6.107e10, "nu": 0.1621}
+    case = load("dam", section | joint | concrete, "7.221,24.07", "0")
+    path = FailurePath(case, interface_of(case), to_growth=True)
+    assert path.points[-1].level == 24.07 and path.points[-1].damage.max() < 1e-3
+    path.advance()
+    assert path.points[-1].level > 24.07 and not path.starts
+
+
 def test_no_step_is_tried_above_the_level_at_which_a_joint_slides(monkeypatch):
     """A higher one has no equilibrium; the run ends at that level."""
     stepper = LoadStepper(load("dam", SLIDES, "20,45"))

@@ -27,6 +27,7 @@ from ..solver.load_stepper import SAME_TIME, LoadStepper
 from ..solver.path import (
     BY_LEVEL,
     FALL,
+    LEVEL_RISE,
     PRECISION,
     RISE,
     SURE,
@@ -189,14 +190,27 @@ class FailurePath(EquilibriumPath):
                     return
                 end, length = new[-1], new[-1].state.time - point.state.time
                 softens = self.on_path(end) and softened(end) > at_rest + self.most_softened
-                if softens and length > smallest:
+                passed = self.on_path(end) and self.is_beyond_limit(end, point)
+                if (softens or passed) and length > smallest:
                     length /= 2
                     continue
+                if passed:
+                    return
                 for equilibrium in new:
                     self.add(equilibrium)
                 if softens:
                     return
                 point, length = end, 2 * length
+
+    def is_beyond_limit(self, point: Point, begin: Point) -> bool:
+        """Whether damage that has grown up to an equilibrium leaves none at a level just above: a
+        long step of the level may lead to the falling part of a branch.
+        """
+        level, grown = (1 + PRECISION) * point.level, point.damage > begin.damage
+        if not (self.softens and grown.any()) or level > self.case.highest_level:
+            return False
+        time = self.case.times[-1] + TICK
+        return solve_once(self.solved, point, time, LevelControl(level), 0.0, LEVEL_RISE) is None
 
     def by_level(self, point: Point, length: float) -> list[Point]:
         """The equilibria at the middle and at the end of the longest step of the level from a
