@@ -113,6 +113,19 @@ def test_a_long_step_of_the_level_does_not_lead_to_the_falling_part_of_a_branch(
     assert path.points[-1].level > 24.07 and not path.starts
 
 
+def test_with_flow_an_increment_does_not_pass_to_an_opening_with_more_water():
+    """From 69.92 m a single increment led to 78.168 m, where the whole joint slips under more
+    uplift: that was confirmed, beside 78.806 m from other first levels.
+    """
+    section = {"dam_height": 69.92, "dam_base": 57.29, "dam_crest": 11.57, "n_joint": 20}
+    joint = {"law": "friction", "sigma_max": 50060, "adhesion": 35900, "mu": 0.9038}
+    joint |= {"K_N": 1.816e11, "K_T": 1.729e11, "uplift": "flow"}
+    concrete = {"E": 2.994e10, "E_found": 4.427e9, "nu": 0.2053}
+    case = load("dam", section | joint | concrete, "20.976,69.92", "0")
+    answer = Search(case, "level").run()
+    assert answer.confirmed and answer.value == pytest.approx(78.806, rel=1e-4)
+
+
 def test_no_step_is_tried_above_the_level_at_which_a_joint_slides(monkeypatch):
     """A higher one has no equilibrium; the run ends at that level."""
     stepper = LoadStepper(load("dam", SLIDES, "20,45"))

@@ -234,6 +234,14 @@ class Point:
         """Whether there is a joint that slides."""
         return self.sliding is not None
 
+    @property
+    def is_last(self) -> bool:
+        """Whether it slides, and no other history and no smaller opening, with less water in it,
+        has a higher level.
+        """
+        equilibrium = self.model.equilibrium
+        return self.slides and not (equilibrium.path_dependent or equilibrium.flowing)
+
     @cached_property
     def compressions(self) -> list[float]:
         """Largest total compression at the toe of each joint [Pa]."""
@@ -874,7 +882,8 @@ class EquilibriumPath:
             if whole is None:
                 by *= SHRINKING
                 continue
-            if not (self.verified and point.model.equilibrium.path_dependent):
+            equilibrium = point.model.equilibrium
+            if not (self.verified and (equilibrium.path_dependent or equilibrium.flowing)):
                 return [whole], 0.0
             error = self.predictor_error(point, whole)
             if error <= 1:
@@ -963,7 +972,7 @@ class EquilibriumPath:
         they lead to the same level, to the precision.
         """
         top = self.points[self.top] if self.points else None
-        if top is None or (top.slides and not top.model.equilibrium.path_dependent):
+        if top is None or top.is_last:
             return None
         again = self.by_shorter()
         if not self.widen(again, PRECISION / 2):
@@ -1033,7 +1042,7 @@ class EquilibriumPath:
         if not self.points:
             return top, self.highest
         point = self.points[top]
-        if point.slides and not point.model.equilibrium.path_dependent:
+        if point.is_last:
             return top, self.highest
         last = min(self.counted, len(self.points) - 1)
         bounds = [(self.bound(first), first) for first in range(last)]
