@@ -81,6 +81,32 @@ def test_rounds_of_the_relaxation_are_solved_as_far_as_they_count(monkeypatch):
     np.testing.assert_allclose(one.state.jump, whole.state.jump, rtol=0, atol=1e-14)
 
 
+def test_rounds_whose_residuals_fall_steadily_are_ended_by_the_law(monkeypatch):
+    """Newton's method leads in a third of the rounds to the state at which they end themselves."""
+    dam = {"dam_height": 7.75, "dam_base": 4.81, "dam_crest": 0.846, "E": 1.36e10}
+    law = {"law": "bond", "K_N": 1e12, "K_T": 1e12, "sigma_max": 0, "adhesion": 1e5, "mu": 0.7}
+    mesh = {"n_joint": 10, "order": 1, "found_side": 7, "found_depth": 7}
+    stepper = LoadStepper(load("dam", dam | law | mesh | {"G_f": 2, "G_t": 4}))
+    stepper.weigh()
+    rounds, states = [], []
+    for steady in (relaxation.steady, lambda sizes: False):
+        seen = []
+        record = lambda sizes, steady=steady, seen=seen: seen.append(1) or steady(sizes)
+        monkeypatch.setattr(relaxation, "steady", record)
+        step, balanced = relaxation.relax(stepper.model, stepper.state, 1.0, LevelControl(7.75))
+        assert balanced
+        rounds.append(len(seen))
+        states.append(step.state.jump)
+    assert 3 <= rounds[0] < rounds[1] / 2
+    np.testing.assert_allclose(*states, rtol=0, atol=1e-8 * np.abs(states[1]).max())
+
+
+def test_a_steady_fall_needs_the_same_ratio_three_times():
+    assert relaxation.steady([9, 8, 4, 2, 1]) and relaxation.steady([8, 4.01, 2, 1])
+    assert not relaxation.steady([4, 2, 1]) and not relaxation.steady([8, 4.1, 2, 1])
+    assert not relaxation.steady([1, 2, 4, 8]) and not relaxation.steady([1, 1, 1, 1])
+
+
 @pytest.mark.parametrize("law", LAWS)
 def test_alternate_minimisation_converges_to_the_law(law):
     """At constant jump: freeze the damage, update it, until it does not change."""

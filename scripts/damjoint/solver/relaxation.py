@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from ..arrays import Array
 from .controls import Control, LevelControl
-from .model import Model, StepOptions, StepResult
+from .model import Begun, Model, StepOptions, StepResult
 from .newton import Strategy, repeats
 from .state import State
 from .step import not_given_up
@@ -31,6 +33,19 @@ SAME = 1e-6
 #: that of rounds solved to the tolerance, with this 4e-8, with ten times more 2e-7.
 ROUGH = 1e-4
 
+#: Ratio of the residuals of two rounds up to which the next one begins where they lead on to [-].
+#: Where the residual grows by more a further part of the joint breaks, and another movement begins.
+MOST_GROWTH = 1.5
+
+#: The residuals of the rounds fall steadily if their last ratios differ by less than this part of
+#: the last one [-]: then the same points soften or slide in all of them, and the state to which
+#: they lead is known.
+STEADY = 0.01
+#: Number of these ratios.
+RATIOS = 3
+#: How far an equilibrium of the law may be beside that state, over the distance to it [-].
+BESIDE = 0.1
+
 
 def relax(
     model: Model, begin: State, time: float, control: Control
@@ -49,13 +64,18 @@ def relax(
     before_quake = model.before_quake(begin, time)
     strategies = [strategy for strategy in model.strategies[:-1] if not strategy.release]
     steps = model.water_steps(begin, time)
+    since = 0  # the round from which on the residuals may be steady
     for _ in range(ROUNDS):
         start = state.begin_step(laws, time)
         frozen = start.freeze(equilibrium)
         coupled = strategies[:1] if equilibrium.flowing else strategies
         begun = model.begin(start, time, frozen)
         step, rough = None, ROUGH * sizes[-1] if sizes else 0.0
-        if len(sizes) > 1 and sizes[-1] < sizes[-2]:
+        if steady(sizes[since:]):
+            since, ratio = len(sizes), sizes[-1] / sizes[-2]
+            ahead = ratio / (1 - ratio) * moved
+            step = equilibrium_ahead(model.begin(start, time), control, strategies[0], ahead)
+        if step is None and len(sizes) > 1 and sizes[-1] < MOST_GROWTH * sizes[-2]:
             # from where the last round leads on to: at its own end all slip and contact would begin
             # elastic, and yield again one after the other
             last, level = begun.predict(control, extrapolate=False)
@@ -88,6 +108,28 @@ def relax(
         sizes.append(size)
         relaxed = replace(step, iterations=iterations)
     return (relaxed, False) if relaxed else None
+
+
+def steady(sizes: Sequence[float]) -> bool:
+    """Whether the residuals of the last rounds fall by the same factor."""
+    ratios = np.divide(sizes[1:], sizes[:-1])[-RATIOS:]
+    return bool(
+        len(ratios) == RATIOS and ratios.max() < 1 and np.ptp(ratios) <= STEADY * ratios[-1]
+    )
+
+
+def equilibrium_ahead(
+    begun: Begun, control: Control, strategy: Strategy, ahead: Array
+) -> StepResult | None:
+    """The equilibrium of the law itself at which rounds end that fall steadily, a movement (j,)
+    ahead; None if there is none beside it.
+    """
+    last, level = begun.predict(control, extrapolate=False)
+    end = last + ahead
+    step = begun.solve(control, StepOptions([strategy], guess=(end, level)))
+    if step and np.abs(step.state.jump - end).max() <= BESIDE * np.abs(ahead).max():
+        return step
+    return None
 
 
 def over_unstable_growth(
