@@ -9,7 +9,7 @@ from damjoint.input.resolve import load
 from damjoint.laws import LAWS
 from damjoint.solver import relaxation
 from damjoint.solver.controls import LevelControl
-from damjoint.solver.load_stepper import LoadStepper
+from damjoint.solver.load_stepper import LoadStepper, Mechanism
 from damjoint.solver.relaxation import ROUGH
 from damjoint.statics.hints import hints
 from damjoint.statics.verdict import verdict
@@ -99,6 +99,19 @@ def test_rounds_whose_residuals_fall_steadily_are_ended_by_the_law(monkeypatch):
         states.append(step.state.jump)
     assert 3 <= rounds[0] < rounds[1] / 2
     np.testing.assert_allclose(*states, rtol=0, atol=1e-8 * np.abs(states[1]).max())
+
+
+def test_steps_are_not_shortened_for_every_growth_beyond_the_end_of_a_path():
+    """They are until relaxation has led beyond it once, and where a mechanism has been shown."""
+    stepper = LoadStepper(load("e", {"E_dam": 21e9, "n_joint": 20.0}))
+    stepper.weigh()
+    assert not stepper.beyond_path(smallest=False)
+    stepper.path_ended = True
+    assert stepper.beyond_path(smallest=False) and not stepper.beyond_path(smallest=True)
+    assert stepper.over_limit_point(3.0, cuts=1, smallest=True)
+    assert not stepper.beyond_path(smallest=False)
+    stepper.mechanism = Mechanism("sliding", 4.0, 3.0)
+    assert stepper.beyond_path(smallest=False) and stepper.beyond_path(smallest=True)
 
 
 def test_a_steady_fall_needs_the_same_ratio_three_times():

@@ -80,6 +80,8 @@ class LoadStepper:
         self.end_of_solution = ""
         #: whether an equilibrium path has been followed to its end
         self.path_ended = False
+        #: whether the crack has grown unstably beyond its end
+        self.grown_beyond_path = False
         #: whether its increments that are as predicted need no halves, see `EquilibriumPath`
         self.predicts = False
         #: the state from which the last one was followed
@@ -394,10 +396,11 @@ class LoadStepper:
         return max(float(np.abs(end.nodes - begin.nodes).max()) for end, begin in pairs)
 
     def beyond_path(self, smallest: bool) -> bool:
-        """Whether an equilibrium path has ended and is not followed again: the dam has failed, or
-        the step can be shortened first.
+        """Whether nothing leads on beyond the end of an equilibrium path: the dam has failed, or
+        the step can be shortened first, unless unstable growth has led beyond that end before.
         """
-        return self.path_ended and (self.mechanism is not None or not smallest)
+        first = not (smallest or self.grown_beyond_path)
+        return self.path_ended and (self.mechanism is not None or first)
 
     def fallback_step(self, time: float, target: float) -> StepResult | None:
         """The whole step to a target by the last strategy or, where it does not converge, the one
@@ -435,11 +438,7 @@ class LoadStepper:
             return None
         for power in POWERS_BEYOND:
             time = min(self.state.time + 2**power * self.case["smallest_step"], target)
-            step, relaxed = over_unstable_growth(
-                self.model, self.state, time, self.control(time), True, self.failures
-            )
-            if step and relaxed:
-                self.relaxed_at += (step.state.loading.level,)
+            step = self.over_growth(time, accept_relaxed=True)
             if step or time == target:
                 return step
         return None
@@ -462,14 +461,21 @@ class LoadStepper:
                 return None
         if step is None and (laws.softens or equilibrium.flowing):
             accept_relaxed = laws.softens and (bool(self.relaxed_at) or smallest or cuts > 0)
-            control, failures = self.control(time), self.failures
-            step, relaxed = over_unstable_growth(
-                self.model, self.state, time, control, accept_relaxed, failures
-            )
+            step = self.over_growth(time, accept_relaxed)
             if step and self.leaps(step):
                 self.record_leap(self.state, step.state)
-            if step and relaxed:
-                self.relaxed_at += (step.state.loading.level,)
+        return step
+
+    def over_growth(self, time: float, accept_relaxed: bool) -> StepResult | None:
+        """A step over unstable crack growth by relaxation, see `over_unstable_growth`."""
+        control, failures = self.control(time), self.failures
+        step, relaxed = over_unstable_growth(
+            self.model, self.state, time, control, accept_relaxed, failures
+        )
+        if step and relaxed:
+            self.relaxed_at += (step.state.loading.level,)
+        if step:
+            self.grown_beyond_path = self.path_ended
         return step
 
     def along_path(self, time: float, again: bool = True) -> StepResult | None:
