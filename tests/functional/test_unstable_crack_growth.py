@@ -1,5 +1,6 @@
 """Unstable crack growth at constant load, and the state after it."""
 
+from collections import Counter
 from dataclasses import fields
 from pathlib import Path
 
@@ -10,7 +11,9 @@ from damjoint.laws import LAWS
 from damjoint.solver import relaxation
 from damjoint.solver.controls import LevelControl
 from damjoint.solver.load_stepper import LoadStepper, Mechanism
+from damjoint.solver.model import Begun
 from damjoint.solver.relaxation import ROUGH
+from damjoint.solver.step import MOST_FAILURES
 from damjoint.statics.hints import hints
 from damjoint.statics.verdict import verdict
 from damjoint_witness.files import Files
@@ -112,6 +115,20 @@ def test_steps_are_not_shortened_for_every_growth_beyond_the_end_of_a_path():
     assert not stepper.beyond_path(smallest=False)
     stepper.mechanism = Mechanism("sliding", 4.0, 3.0)
     assert stepper.beyond_path(smallest=False) and stepper.beyond_path(smallest=True)
+
+
+def test_what_has_failed_with_frozen_damage_is_not_tried_again(monkeypatch):
+    """First with flow and jump together, then with frozen pressure."""
+    stepper = LoadStepper(load("e", {"E_dam": 21e9, "n_joint": 20.0}))
+    stepper.weigh()
+    model, tried = stepper.model, []
+    spy = lambda self, control, options: tried.append(list(options.strategies))
+    monkeypatch.setattr(Begun, "solve", spy)  # nothing converges
+    first, *others = (one for one in model.strategies[:-1] if not one.release)
+    for failures in (None, Counter(dict.fromkeys(model.strategies, MOST_FAILURES))):
+        step = relaxation.relax(model, stepper.state, 3.0, LevelControl(8.0), failures)
+        assert step is None
+    assert others and tried == [[first], [first, *others], [first], [first]]
 
 
 def test_a_steady_fall_needs_the_same_ratio_three_times():

@@ -103,6 +103,8 @@ class LoadStepper:
         self.passed_over: tuple[tuple[float, float], ...] = ()
         #: see `Plan`: of the strategies in direct steps and from relaxed states
         self.failures = Counter[Strategy]()
+        #: the same with frozen damage
+        self.frozen_failures = Counter[Strategy]()
         #: whether the mesh does not resolve the fracture process zone of a joint
         self.unresolved = any(map(process_zone.unresolved, self.case.joints))
         #: time of the step in which the pressure of water in time has changed most beyond the
@@ -129,6 +131,7 @@ class LoadStepper:
         other.on_step = lambda time: None
         other.model, other.history = self.model.with_case(case), self.history.copy()
         other.failures = self.failures.copy()
+        other.frozen_failures = self.frozen_failures.copy()
         return other
 
     # -- the loading
@@ -438,7 +441,7 @@ class LoadStepper:
             return None
         for power in POWERS_BEYOND:
             time = min(self.state.time + 2**power * self.case["smallest_step"], target)
-            step = self.over_growth(time, accept_relaxed=True)
+            step = self.over_growth(time, accept_relaxed=True, smallest=True)
             if step or time == target:
                 return step
         return None
@@ -461,16 +464,23 @@ class LoadStepper:
                 return None
         if step is None and (laws.softens or equilibrium.flowing):
             accept_relaxed = laws.softens and (bool(self.relaxed_at) or smallest or cuts > 0)
-            step = self.over_growth(time, accept_relaxed)
+            step = self.over_growth(time, accept_relaxed, smallest)
             if step and self.leaps(step):
                 self.record_leap(self.state, step.state)
         return step
 
-    def over_growth(self, time: float, accept_relaxed: bool) -> StepResult | None:
-        """A step over unstable crack growth by relaxation, see `over_unstable_growth`."""
-        control, failures = self.control(time), self.failures
+    def over_growth(self, time: float, accept_relaxed: bool, smallest: bool) -> StepResult | None:
+        """A step over unstable crack growth by relaxation, see `over_unstable_growth`; smallest:
+        whether it can be cut no more.
+        """
         step, relaxed = over_unstable_growth(
-            self.model, self.state, time, control, accept_relaxed, failures
+            self.model,
+            self.state,
+            time,
+            self.control(time),
+            accept_relaxed,
+            self.failures,
+            None if smallest else self.frozen_failures,
         )
         if step and relaxed:
             self.relaxed_at += (step.state.loading.level,)

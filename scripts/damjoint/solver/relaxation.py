@@ -48,14 +48,19 @@ BESIDE = 0.1
 
 
 def relax(
-    model: Model, begin: State, time: float, control: Control
+    model: Model,
+    begin: State,
+    time: float,
+    control: Control,
+    failures: Counter[Strategy] | None = None,
 ) -> tuple[StepResult, bool] | None:
     """The state after unstable crack growth by alternate minimisation, and whether the law is in
     equilibrium there; None if there is none. The step is solved with frozen damage, then the damage
     is updated, until the law is in equilibrium or after ROUNDS of them.
 
     Where the flow cannot be solved for together with the jump its pressure is frozen, too. The
-    relaxed state is more damaged than a direct step would give.
+    relaxed state is more damaged than a direct step would give. failures: of the strategies with
+    frozen damage, see `Plan`; None: all are tried.
     """
     equilibrium, state = model.equilibrium, begin
     laws, iterations, sizes = equilibrium.laws, 0, list[float]()
@@ -63,6 +68,10 @@ def relax(
     moved = np.zeros_like(begin.jump)  # in the last round
     before_quake = model.before_quake(begin, time)
     strategies = [strategy for strategy in model.strategies[:-1] if not strategy.release]
+    if failures is None:
+        failures = Counter()
+    else:
+        strategies[1:] = not_given_up(strategies[1:], failures)
     steps = model.water_steps(begin, time)
     since = 0  # the round from which on the residuals may be steady
     for _ in range(ROUNDS):
@@ -82,14 +91,16 @@ def relax(
             guess = last + sizes[-1] / sizes[-2] * moved, level
             options = StepOptions(strategies[:1], persist=False, guess=guess, rough=rough)
             step = begun.solve(control, options)
-        step = step or begun.solve(control, StepOptions(coupled, persist=False, rough=rough))
+        options = StepOptions(coupled, persist=False, rough=rough, failures=failures)
+        step = step or begun.solve(control, options)
         if step is None and equilibrium.flowing:
             level = control.level if isinstance(control, LevelControl) else start.loading.level
             opened = before_quake or start
             water = equilibrium.water_in_step(opened.variables, steps=steps)
             lift = water.flow(opened.jump, model.loading(time, level)).lift
             begun = replace(begun, constant_lift=lift)
-            step = begun.solve(control, StepOptions(strategies, persist=False, rough=rough))
+            options = replace(options, strategies=strategies)
+            step = begun.solve(control, options)
         if step is None:
             return None
         iterations += step.iterations
@@ -139,12 +150,14 @@ def over_unstable_growth(
     control: Control,
     accept_relaxed: bool,
     failures: Counter[Strategy] | None = None,
+    frozen_failures: Counter[Strategy] | None = None,
 ) -> tuple[StepResult | None, bool]:
     """A step over unstable crack growth, and whether it is the relaxed state: by Newton's method
     from that state, by the law from the last one; where it does not converge and `accept_relaxed`,
-    the relaxed state itself, if the law is in equilibrium there. failures: see `Plan`.
+    the relaxed state itself, if the law is in equilibrium there. failures: see `Plan`;
+    frozen_failures: see `relax`.
     """
-    end = relax(model, begin, time, control)
+    end = relax(model, begin, time, control, frozen_failures)
     if end is None:
         return None, False
     relaxed, balanced = end
