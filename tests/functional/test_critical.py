@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+from copy import copy
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -291,7 +292,8 @@ def test_a_limit_without_a_mechanism_is_not_confirmed(monkeypatch, command):
     monkeypatch.setattr(FailurePath, "advance_branch", lambda self: False)
     ends = lambda self, last: vars(self).update(ended=True)
     monkeypatch.setattr(FailurePath, "pass_over", ends)
-    monkeypatch.setattr(FailurePath, "rise_on", lambda self: False)
+    for way in ("rise_on", "step_over"):
+        monkeypatch.setattr(FailurePath, way, lambda self: False)
     code, out, _ = command("critical", "c", "--set", "pena_tang=0", "--levels", "6,8")
     # the interval has the highest levels of all three repetitions
     assert code == 3 and "critical level 6 m, not confirmed: between 6 and 6.625 m" in out
@@ -307,7 +309,8 @@ def test_the_end_of_a_branch_above_which_a_run_stands_is_not_confirmed(monkeypat
     )
     ends = lambda self, last: vars(self).update(ended=True)
     monkeypatch.setattr(FailurePath, "pass_over", ends)
-    monkeypatch.setattr(FailurePath, "rise_on", lambda self: False)
+    for way in ("rise_on", "step_over"):
+        monkeypatch.setattr(FailurePath, way, lambda self: False)
     monkeypatch.setattr(FailurePath, "repeated", lambda self: None)
     _, answer = search_result("c", settings={"pena_tang": 0.0}, levels="3,4")
     assert answer.growth == answer.value < 5.1 and not answer.confirmed
@@ -356,6 +359,7 @@ def test_a_run_with_less_uplift_does_not_stand_beyond_a_crack_whose_water_withdr
     points = [SimpleNamespace(level=33.665)]
     path = SimpleNamespace(points=points, counted=1, highest=33.665, unstable_fall=1e-3, target=60)
     path.water_withdraws = path.leads_higher = True
+    path.level_above = 1.001 * 33.665
     path.has_full_uplift = lambda history: levels <= full
     path.run_to = lambda *_: run
     search = Search(load("dam"), "level")
@@ -371,7 +375,9 @@ def test_a_branch_that_ends_where_water_enters_ends_in_unstable_crack_growth(ope
     less uplift: it was not confirmed.
     """
     run = SimpleNamespace(stopped=False, history=SimpleNamespace(rows={"level": [28.6, 30.074]}))
-    path = SimpleNamespace(highest=28.6553, target=39, interval=(np.nan, np.nan))
+    path = SimpleNamespace(
+        highest=28.6553, target=39, level_above=28.684, interval=(np.nan, np.nan)
+    )
     path.to_growth, path.run_to, path.opens_beyond = False, lambda *_: run, lambda _: opens
     search = Search(load("dam"), "level")
     search.levels_after = True
@@ -383,7 +389,8 @@ def test_a_branch_that_ends_where_water_enters_ends_in_unstable_crack_growth(ope
 @pytest.mark.heavy
 def test_a_path_is_continued_from_a_run_where_water_enters():
     """Each element that the water enters turns the path, which ended at 80.11 m, while runs stand
-    above, with as much uplift: no level was confirmed. The whole joint slips at 84.03 m.
+    above, with as much uplift: no level was confirmed. The whole joint slips at 83.69 m (by
+    shorter increments at 84.03 m, which is not confirmed).
     """
     section = {"dam_height": 56.63, "dam_base": 52.15, "dam_crest": 7.059, "n_joint": 20}
     joint = {"K_N": 6.984e11, "K_T": 4.486e11, "adhesion": 437.9e3, "sigma_max": 593.7e3}
@@ -393,16 +400,26 @@ def test_a_path_is_continued_from_a_run_where_water_enters():
     path, _ = finished(search.path(16.989, search.base, 100.0, to_growth=True))
     begin = next(point for point in path.points if len(point.model.case.levels) > 1)
     assert begin.level < 80.2 and path.has_full_uplift(path.points[path.top].history)[-1]
-    assert path.ran_on and path.slides and path.highest == pytest.approx(84.0267, rel=1e-4)
+    assert path.ran_on and path.slides and path.highest == pytest.approx(83.688, rel=1e-4)
 
 
-def test_uplift_is_full_where_no_joint_has_less_than_before_the_water_withdraws():
-    """Joints with uplift 3 and 5 at most. A dam of 43 m had 0.4 % less at a level higher by 0.1 %,
-    and 40 % less where it failed: the water was withdrawing already.
+def test_uplift_is_full_where_the_water_reaches_as_far_in_all_joints_as_before_it_withdraws():
+    """Joints that are filled to 0.3 and 0.5 at most; the second one at 1 m. A dam of 43 m had 0.4 %
+    less at a level higher by 0.1 %, and 40 % less where it failed: the water was withdrawing
+    already. One of 43 m reaches a level of 46.25 m with more uplift than at 41 m, but from a
+    shorter part of the joint: 41.01 and 46.25 m were confirmed.
     """
-    path = SimpleNamespace(case=SimpleNamespace(joints=[1, 2]))
-    path.admissible = [SimpleNamespace(last={"U": u, "U_2": v}) for u, v in ((2, 5), (3, 4))]
-    rows = {"level": [1, 2, 3, 4], "U": [3, 3.1, 2.99, 4], "U_2": [5, 5, 6, 4.99]}
+    points = [
+        SimpleNamespace(weights=np.array([1.0]), positions=np.array([[0.0, y, 0.0]]))
+        for y in (0.0, 1.0)
+    ]
+    joints = [SimpleNamespace(points=point, width=2.0) for point in points]
+    equilibrium = SimpleNamespace(interface=SimpleNamespace(joints=joints), unit_weight=10.0)
+    path = SimpleNamespace(stepper=SimpleNamespace(model=SimpleNamespace(equilibrium=equilibrium)))
+    path.admissible = [SimpleNamespace(filled=filled) for filled in ((0.2, 0.5), (0.3, 0.4))]
+    rows = {"level": [5, 6, 7, 8], "tail_level": [2, 2, 2, 2]}  # 10 (level - tail) each if full
+    rows["U"] = [(20 + 9) / 2, (20 + 12) / 2, (20 + 14.9) / 2, (20 + 18) / 2]
+    rows["U_2"] = [(10 + 15) / 2, (10 + 20) / 2, (10 + 25) / 2, (10 + 29.9) / 2]
     full = FailurePath.has_full_uplift(path, SimpleNamespace(rows=rows))
     assert full.tolist() == [True, True, False, False]
 
@@ -477,7 +494,8 @@ def test_no_bound_of_statics_confirms_what_a_run_passes_where_water_enters(monke
     )
     ends = lambda self, last: vars(self).update(ended=True)
     monkeypatch.setattr(FailurePath, "pass_over", ends)
-    monkeypatch.setattr(FailurePath, "rise_on", lambda self: False)
+    for way in ("rise_on", "step_over"):
+        monkeypatch.setattr(FailurePath, way, lambda self: False)
     monkeypatch.setattr(FailurePath, "run_on", lambda self: False)
     monkeypatch.setattr(FailurePath, "repeated", lambda self: None)
     settings = {"pena_tang": 0.0, "uplift": "cracked"}
@@ -509,7 +527,8 @@ def test_statics_confirms_a_level_near_its_bound(monkeypatch):
     """Only where the search does not progress; the value is that of an equilibrium."""
     monkeypatch.setattr(FailurePath, "advance", lambda self: vars(self).update(ended=True))
     monkeypatch.setattr(FailurePath, "repeated", lambda self: None)
-    monkeypatch.setattr(FailurePath, "rise_on", lambda self: False)
+    for way in ("rise_on", "step_over"):
+        monkeypatch.setattr(FailurePath, way, lambda self: False)
     monkeypatch.setattr(failure_path, "SOFTENED", np.inf)
     settings = NO_TENSION | {"n_joint": 20.0}
     _, answer = search_result("i", settings=settings, levels="9.95,10.1")
@@ -614,11 +633,9 @@ def test_bad_input_is_refused(command, tmp_path, words, message):
 
 
 @pytest.mark.heavy
-def test_a_level_beyond_unstable_growth_is_not_confirmed_if_other_ways_do_not_lead_there(
-    monkeypatch,
-):
+def test_no_way_is_followed_twice_and_levels_with_less_uplift_do_not_count(monkeypatch):
     """Random dam 112-5, from a lower first level: the crack of a lift runs through from 8.002 m;
-    the friction beyond it bears 8.505 m, which was confirmed beside 8.002 m.
+    the friction beyond it bears 8.505 m, with less uplift, which was confirmed beside 8.002 m.
     """
     settings = {
         "dam_height": 5.1,
@@ -658,8 +675,7 @@ def test_a_level_beyond_unstable_growth_is_not_confirmed_if_other_ways_do_not_le
     monkeypatch.setattr(Search, "from_beginning", recorded)
     _, answer = search_result("dam", "level", settings, [2.285], "1.07")
     assert len(set(ways)) == len(ways) > 1  # no way proves anything twice
-    assert answer.value > 8.49 and not answer.confirmed
-    assert answer.doubt.startswith("between ")
+    assert answer.value == pytest.approx(8.0017, rel=1e-4)
 
 
 @pytest.mark.heavy
@@ -871,14 +887,70 @@ def test_a_release_of_shear_without_a_fall_of_the_level_is_no_growth():
 
 
 @pytest.mark.heavy
-def test_a_point_that_levels_pass_over_is_no_confirmed_growth():
-    """By levels the point at 19.95 m is passed over, by increments of a displacement it is not: the
-    first unstable growth was there, or at 24.87 m, confirmed.
+@pytest.mark.parametrize("levels", ["6.072,20.24", "10"])
+def test_where_a_point_releases_its_shear_and_none_breaks_no_crack_grows(levels):
+    """By levels the point at 19.95 m is passed over, by increments of a displacement it was not:
+    the first unstable growth was there, or at 24.87 m, confirmed.
     """
-    _, answer = search_result("dam", settings=RELEASED, levels="6.072,20.24")
-    assert not answer.confirmed
-    low, high = (float(number) for number in re.findall(r"\d+\.?\d*", answer.doubt)[:2])
-    assert low < 19.95 and high > 24.5
+    _, answer = search_result("dam", settings=RELEASED, levels=levels)
+    assert answer.confirmed and answer.value == pytest.approx(24.9629, rel=1e-5)
+
+
+#: A dam on a joint whose shear stiffness is lost as it opens, under linear uplift.
+OPENS = {"dam_height": 23.4, "dam_base": 20.76, "dam_crest": 3.612, "n_joint": 20, "E": 1.89e10}
+OPENS |= {"E_found": 1.582e10, "nu": 0.219, "law": "rupture", "K_N": 1.56e11, "K_T": 8.908e10}
+OPENS |= {
+    "sigma_max": 57300,
+    "mu": 1.11,
+    "adhesion": 133e3,
+    "pena_rupture": 0.429,
+    "alpha": 0,
+    "uplift": "imposed",
+}
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("levels", ["7.02", "11.7"])
+def test_a_path_goes_on_where_relaxation_leads_higher_and_no_tension_is_lost(levels):
+    """The branch ends as the shear of a point is released, at 26.551 m, which was said to be
+    unstable growth; nothing is damaged there, and filling leads on.
+    """
+    search, answer = search_result("dam", settings=OPENS, levels=levels)
+    assert answer.confirmed and answer.value == pytest.approx(27.1031, rel=1e-5)
+    path, _ = finished(search.path(float(levels), search.base, 46.0, to_growth=True))
+    assert path.stepped_to and path.stepped_to[0].damage.max() == 0
+    assert 26.55 < path.stepped_to[0].level < 26.58
+
+
+@pytest.mark.heavy
+def test_a_crack_that_loses_tension_or_lets_water_in_has_grown():
+    search = Search(load("dam", OPENS, "11.7"), "level")
+    path, _ = finished(search.path(11.7, search.base, 46.0, to_growth=True))
+    begin = path.points[path.top]
+    tension = 57300 * begin.model.equilibrium.interface.weights
+    for lost, grown in ((0.99e-3, False), (1.01e-3, True)):
+        point = copy(begin)
+        vars(point)["damage"] = begin.damage + lost * begin.thrust / tension.sum()
+        assert point.has_grown(begin) == grown and not begin.has_grown(point)
+    point = copy(begin)
+    vars(point)["uplifts"] = begin.uplifts + 1.01e-3 * begin.thrust
+    assert point.has_grown(begin)
+    vars(point)["uplifts"] = begin.uplifts + 0.99e-3 * begin.thrust
+    assert not point.has_grown(begin)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("rise", [1.0, 1 / 3])
+def test_how_far_the_level_falls_is_known_to_a_part_of_the_fall_that_counts(rise):
+    """It falls by 1.15e-3: with 1.35 times the fall that counts as unstable growth it did not, and
+    the level, the same from four beginnings, was not confirmed.
+    """
+    dam = {"dam_height": 29.3, "dam_base": 25.64, "dam_crest": 5.641, "n_joint": 20, "E": 2.78e10}
+    joint = {"law": "endo", "K_N": 4.49e11, "K_T": 3.372e11, "mu": 1.08, "adhesion": 465e3}
+    joint |= {"sigma_max": 368e3, "G_f": 4.85, "uplift": "imposed"}
+    settings = dam | joint | {"nu": 0.193, "E_found": 5.81e10}
+    _, answer = search_result("dam", settings=settings, levels="14.65", rise=rise)
+    assert answer.confirmed and answer.growth == pytest.approx(32.3071, rel=1e-5)
 
 
 @pytest.mark.heavy
@@ -942,9 +1014,9 @@ def test_a_way_from_the_same_beginning_solves_no_step_again(monkeypatch):
 
 
 @pytest.mark.heavy
-def test_growth_that_one_path_sees_and_another_does_not_is_not_confirmed():
-    """The level falls by 1.3e-3 from one point to the next, with shorter increments by less than
-    the 1e-3 of unstable growth. The interval of either path has the level of the other.
+def test_a_fall_of_the_level_is_seen_by_long_and_by_short_increments():
+    """It falls by 1.3e-3 from one point to the next; by shorter increments it had fallen by less
+    than the 1e-3 of unstable growth, and the highest level was 129.4 m.
     """
     dam = {"dam_height": 110.4, "dam_base": 97.49, "dam_crest": 11.8, "n_joint": 20.0}
     joint = {"law": "rupture", "K_N": 5.196e10, "K_T": 4.116e10, "uplift": "flow"}
@@ -954,12 +1026,9 @@ def test_growth_that_one_path_sees_and_another_does_not_is_not_confirmed():
         search_result("dam", settings=dam | joint | bodies, levels="110.4", rise=rise)[1]
         for rise in (1.0, 0.3)
     )
-    assert max(one.value, other.value) > 1.01 * min(one.value, other.value)
-    for answer in (one, other):
-        low, high = (float(number) for number in re.findall(r"\d+\.?\d*", answer.doubt)[:2])
-        assert not answer.confirmed
-        assert low < 1.0001 * min(one.value, other.value)
-        assert high > 0.9999 * max(one.value, other.value)
+    assert one.growth == pytest.approx(other.growth, rel=path.PRECISION)
+    assert one.growth == pytest.approx(114.34, rel=path.PRECISION)
+    assert other.confirmed and other.after["by displacement"] > 1.1 * other.growth
 
 
 def test_the_level_may_rise_in_the_last_interval_as_steeply_as_before_it():
@@ -1030,7 +1099,8 @@ def test_a_path_begins_as_a_run_where_single_steps_do_not_lead(monkeypatch):
     search, answer = search_result("dam", settings=RUPTURE | NO_TENSION, levels="20")
     first = search.trials[0].path
     assert first.begun_by_run and first.points[0].level == 20 and answer.value > 20
-    monkeypatch.setattr(FailurePath, "rise_on", lambda self: False)
+    for way in ("rise_on", "step_over"):
+        monkeypatch.setattr(FailurePath, way, lambda self: False)
     monkeypatch.setattr(FailurePath, "advance", lambda self: setattr(self, "ended", True))
     _, answer = search_result("dam", settings=RUPTURE | NO_TENSION, levels="20")
     assert not answer.confirmed and "falls from the first equilibrium on, at 20 m" in answer.doubt
@@ -1138,7 +1208,8 @@ def test_the_interval_has_the_highest_level_of_every_path(monkeypatch):
         return half(self)
 
     monkeypatch.setattr(FailurePath, "by_shorter", lower)
-    monkeypatch.setattr(FailurePath, "rise_on", lambda self: False)
+    for way in ("rise_on", "step_over"):
+        monkeypatch.setattr(FailurePath, way, lambda self: False)
     monkeypatch.setattr(Search, "after_growth", lambda self, path: ({}, path))
     search, answer = search_result("dam", settings=SNAP_BACKS[0])
     low, high = search.trials[-1].path.interval

@@ -21,10 +21,12 @@ from itertools import takewhile
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .. import ROUND_OFF
 from ..arrays import Array
 from ..input.case import Case
+from ..joint.interface import JointInterface
 from ..laws.base import Law
 from ..model.results import column_of
 from .controls import (
@@ -368,6 +370,16 @@ class Point:
         tension = [law.tensile_strength for law in self.laws]
         return self.lost(begin, tension, begun=False) > FALL * self.thrust
 
+    def has_grown(self, begin: Point) -> bool:
+        """Whether a crack has grown since another equilibrium at nearly the same level: tension of
+        more than the part FALL of the water's thrust is lost, or more uplift has entered.
+        """
+        entered = (self.uplifts - begin.uplifts).max(initial=0.0)
+        lost = self.model.equilibrium.interface.weights * np.maximum(self.damage - begin.damage, 0)
+        parts = zip(self.laws, self.state.variables.split(lost), strict=True)
+        tension = sum(law.tensile_strength * part.sum() for law, part in parts if law.softens)
+        return bool(max(tension, entered) > FALL * self.thrust)
+
     def opens_at_once(self, begin: Point) -> bool:
         """Whether a point has lost most of its tensile strength since another equilibrium."""
         at_once = self.damage - begin.damage > AT_ONCE
@@ -434,6 +446,17 @@ class Point:
     def uplifts(self) -> Array:
         """The uplift in each joint [N]."""
         return self.uplifts_in(self.state)
+
+    @cached_property
+    def filled(self) -> Array:
+        """How far each joint is filled, see `filled_part`."""
+        equilibrium, loading = self.model.equilibrium, self.state.loading
+        parts = zip(equilibrium.interface.joints, self.uplifts, strict=True)
+        filled = [
+            filled_part(joint, equilibrium.unit_weight, uplift, loading.level, loading.tail)
+            for joint, uplift in parts
+        ]
+        return np.concatenate(filled)
 
     def uplifts_in(self, state: State) -> Array:
         """The uplift in each joint in another state [N]."""
@@ -749,13 +772,14 @@ class EquilibriumPath:
 
     def by_level_rise(self, last: Point) -> list[Point]:
         """The equilibria at the middle and the end of the largest rise of the level in which the
-        jumps change steadily; empty if there is none.
+        jumps change steadily; empty if there is none, or relaxation leads to one with less damage.
         """
         for rise in (LARGEST_RISE / 4**n for n in range(MOST_RISES)):
             middle = self.raised(last, rise / 2)
             end = middle and self.raised(middle, rise / 2)
             if middle and end and last.steady(middle, end):
-                return [middle, end]
+                relaxed = self.relaxed(last, rise)
+                return [] if relaxed and end.beyond(relaxed, last) else [middle, end]
         return []
 
     def raised(self, point: Point, rise: float) -> Point | None:
@@ -822,20 +846,26 @@ class EquilibriumPath:
         number, again = len(self.points), 0
         while number - 1 - again in self.starts:
             again += 1
-        return self.relaxed(last, range(again, -1, -1))
+        return self.relaxed_above(last, range(again, -1, -1))
 
-    def relaxed(self, last: Point, powers: Iterable[int]) -> Point | None:
-        """The first equilibrium after unstable crack growth at levels that are higher than a
-        point's by the precision times these powers of 2; None if relaxation leads to none.
+    def relaxed_above(self, last: Point, powers: Iterable[int]) -> Point | None:
+        """The first of `relaxed` at levels that are higher by the precision times these powers of
+        2; None if there is none.
+        """
+        points = (self.relaxed(last, 2**power * PRECISION) for power in powers)
+        return next((point for point in points if point), None)
+
+    def relaxed(self, last: Point, rise: float) -> Point | None:
+        """The equilibrium to which relaxation leads at a level higher than a point's by a relative
+        rise; None if there is none.
         """
         time = max(last.state.time, self.time) + self.tick
-        for power in powers:
-            control = LevelControl(last.level * (1 + 2**power * PRECISION))
-            result, _ = over_unstable_growth(last.model, last.state, time, control, True)
-            if result is not None:
-                by = float(np.abs(result.state.jump - last.state.jump).max())
-                return last.after(result, self.imposed(last) + by, "level")
-        return None
+        control = LevelControl(last.level * (1 + rise))
+        result, _ = over_unstable_growth(last.model, last.state, time, control, True)
+        if result is None:
+            return None
+        by = float(np.abs(result.state.jump - last.state.jump).max())
+        return last.after(result, self.imposed(last) + by, "level")
 
     def append(
         self, new: list[Point], another: bool = False, error: float = 0.0, shortened: bool = False
@@ -953,13 +983,6 @@ class EquilibriumPath:
                 return
             self.insert(first, self.between(first))
 
-    def first_branch(self: P) -> P:
-        """The path up to the end of its first branch."""
-        other = self.copied()
-        del other.points[self.starts[0] :]
-        other.starts, other.ended = [], True
-        return other
-
     def copied(self: P) -> P:
         """Another path with the same points, to be continued independently."""
         other = copy(self)
@@ -1049,36 +1072,39 @@ class EquilibriumPath:
         possible, first = max(bounds, default=(self.highest, top))
         return first, max(possible, self.highest)
 
-    def bound(self, first: int) -> float:
+    def bound(self, first: int, sign: int = 1) -> float:
         """An upper bound of the level [m] between a point and the next one; -inf where no point can
-        be inserted.
+        be inserted. sign: -1 for the bound of its negative, by the slopes alone.
         """
         a, b = self.points[first], self.points[first + 1]
         closed = any(a is point for point in self.closed)
         if b.control in BY_LEVEL or first + 1 in self.starts or closed:
             return -np.inf
+        if sign < 0:
+            return self.bound_by_slopes(first, sign)
         before, chord = self.slope(first - 1), (b.level - a.level) / (self.length(first) or 1.0)
         # points that begin to soften may do so after a rise
         hides = before is not None and before > max(chord, 0.0)
         hidden = max(a.level, b.level) + b.hidden_rise(a) if hides else -np.inf
         return max(self.bound_by_slopes(first), hidden)
 
-    def bound_by_slopes(self, first: int) -> float:
-        """An upper bound of the level [m] between a point and the next one, where the lines through
-        their neighbours meet.
+    def bound_by_slopes(self, first: int, sign: int = 1) -> float:
+        """An upper bound of the level [m], times the sign, between a point and the next one, where
+        the lines through their neighbours meet.
         """
-        a, b = self.points[first], self.points[first + 1]
-        before, after = self.slope(first - 1), self.slope(first + 1)
-        rise, length, ends = b.level - a.level, self.length(first), max(a.level, b.level)
+        begin, end = (sign * point.level for point in self.points[first : first + 2])
+        slopes = (self.slope(number) for number in (first - 1, first + 1))
+        before, after = (None if slope is None else sign * slope for slope in slopes)
+        rise, length, ends = end - begin, self.length(first), max(begin, end)
         chord = rise / (length or 1.0)
         if before is None or after is None:
             steepest = max(abs(chord), 0.0 if before is None else before)
-            return max(ends + abs(rise), a.level + steepest * length)
+            return max(ends + abs(rise), begin + steepest * length)
         if before > chord > after:  # where the lines through the neighbours meet
-            return a.level + before * (rise - after * length) / (before - after)
+            return begin + before * (rise - after * length) / (before - after)
         if before > chord:  # it may fall anywhere in between
-            return max(ends, a.level + before * length)
-        return max(ends, b.level - after * length) if chord > after else ends
+            return max(ends, begin + before * length)
+        return max(ends, end - after * length) if chord > after else ends
 
     def length(self, first: int) -> float:
         """How far the jumps move between a point and the next one [m]."""
@@ -1104,6 +1130,28 @@ class EquilibriumPath:
         smallest = max(SMALLEST * length, self.negligible(a, control))
         new = self.along(a, control, length, smallest, b.control)[0]
         return list(takewhile(lambda point: not point.beyond(b, a), new))
+
+
+def filled_part(
+    joint: JointInterface,
+    unit_weight: float,
+    uplifts: ArrayLike,
+    levels: ArrayLike,
+    tails: ArrayLike,
+) -> Array:
+    """The uplift of a joint beyond that of the tailwater alone, over that of a joint full of the
+    reservoir's water [-], (k,): it does not depend on the level, but on how far the water reaches.
+
+    unit_weight: of the water [N/m3]; uplifts: [N], levels and tails: [m], k of each.
+    """
+    heights = joint.points.positions[:, 1]
+
+    def static(levels: ArrayLike) -> Array:
+        return np.maximum(np.atleast_1d(levels)[:, None] - heights, 0) @ joint.points.weights
+
+    tail = static(tails)
+    head = unit_weight * np.maximum(static(levels) - tail, ROUND_OFF)
+    return (np.atleast_1d(uplifts) - unit_weight * tail) / head
 
 
 def deviation(change: float, predicted: float, least: float) -> float:

@@ -333,6 +333,8 @@ class Search:
                 result = self.with_end_of(path, result)
             elif path.stops_at_water:  # the bound of statics alone is not near enough
                 result = self.with_run(path, result)
+        if other is None and path.varies and (path.entering or result.growth is not None):
+            other = path
         if other is None:
             ways = ways_to_confirm(first, path, result, grows, mechanism)
             paths = (self.from_beginning(path, way) for path, way in ways)
@@ -349,7 +351,7 @@ class Search:
         """
         words = withdrawn(path)
         if path.leads_higher or not falls_by_water(path):
-            level = min((1 + ABOVE) * path.highest, path.target)
+            level = path.level_above
             run = path.run_to(level)
             if not run.stopped:
                 run = path.run_to(path.target, run)
@@ -668,9 +670,7 @@ class Search:
         another quantity than the level, to the target). Where the run stands, there are equilibria
         beyond: the branch has ended in unstable growth, or is not the highest one.
         """
-        level = path.target
-        if self.of == "level":
-            level = min((1 + ABOVE) * path.highest, level)
+        level = path.level_above if self.of == "level" else path.target
         run = path.run_to(level)
         if run.stopped:
             comes_near = run.state.loading.level > (1 - ABOVE) * path.highest
@@ -714,13 +714,13 @@ def finished(path: FailurePath) -> tuple[FailurePath, bool]:
         path.refine()  # first: a limit point that is known is confirmed sooner
         path.follow(SURE)
         grows = path.to_growth and (path.grows or path.ends)
-        if grows and path.starts:
+        if grows and path.jumps:
             path = path.first_branch()
         path.refine()
         if not path.highest > highest:  # the rise before has led no further
             return path, grows
         highest = path.highest
-        if not (path.rise_on() or path.run_on()):
+        if not (path.rise_on() or path.run_on() or path.step_over()):
             return path, grows
 
 

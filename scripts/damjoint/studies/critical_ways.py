@@ -16,7 +16,7 @@ LOWER_BEGIN = 0.6
 ABOVE_GROWTH = 1.02
 #: Factor by which the fall that is unstable growth is changed, down and up [-]: it varies by a
 #: quarter with the increments.
-FALL_FACTOR = 1.35
+FALL_FACTOR = 1.05
 
 
 @dataclass(frozen=True)

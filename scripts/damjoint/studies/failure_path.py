@@ -28,12 +28,14 @@ from ..solver.path import (
     BY_LEVEL,
     FALL,
     LEVEL_RISE,
+    MOST_REFINED,
     PRECISION,
     RISE,
     SURE,
     EquilibriumPath,
     Point,
     Solved,
+    filled_part,
     solve_once,
 )
 from .critical_value import AFTER_GROWTH
@@ -62,12 +64,15 @@ HALVINGS = 4
 
 #: At how many levels, of twice the rise each, relaxation is tried just above the highest one.
 RISES = 4
-#: The part of the uplift by which it falls under a rising level where the water withdraws.
+#: The part by which a joint is less filled under a rising level where the water withdraws.
 WITHDRAWN = 0.005
 
 #: Relative distance from the end of a path to the level above it that a run must not reach: up to
 #: it, highest levels after unstable growth are the same.
 ABOVE = AFTER_GROWTH
+
+#: Precision to which it is sought how far the level falls, over the fall that is unstable.
+EXACT = 0.05
 
 #: Time of an increment of displacement, after the last level, where all loads act in full.
 TICK = 1e-3
@@ -125,6 +130,8 @@ class FailurePath(EquilibriumPath):
         self.filled_on: list[Point] = []
         #: its highest point, if it goes on from there with less uplift
         self.dry_beyond: Point | None = None
+        #: the equilibria from which it goes on though its branch has ended before, see `step_over`
+        self.stepped_to: list[Point] = []
         #: whether it has been continued from a run, see `run_on`
         self.ran_on = False
         #: the runs from the beginning, by the level to which they were to lead
@@ -362,6 +369,7 @@ class FailurePath(EquilibriumPath):
                 self.fill_on()
             if self.to_growth and self.top + 1 < len(self.points):
                 self.refine(self.points[-1].level / (1 - self.unstable_fall))  # how far it falls
+                self.refine_fall()
         if not self.reached:
             self.refine(self.target)
 
@@ -382,7 +390,7 @@ class FailurePath(EquilibriumPath):
         self.filled_on = [*self.filled_on, top]
         other = self.copied()
         other.cut_after(self.top)
-        other.pass_to(other.relaxed(other.points[-1], range(RISES)))
+        other.pass_to(other.relaxed_above(other.points[-1], range(RISES)))
         if not other.ended:
             other.advance()
             self.leads_higher = other.ended
@@ -421,7 +429,7 @@ class FailurePath(EquilibriumPath):
         leads_over = self.water_withdraws or not self.softens
         if shown or self.to_growth or not (self.entering and leads_over):
             return False
-        top, run = self.points[self.top], self.run_to(min((1 + ABOVE) * self.highest, self.target))
+        top, run = self.points[self.top], self.run_to(self.level_above)
         if run.stopped or not self.has_full_uplift(run.history)[-1]:
             return False
         by = float(np.abs(run.state.jump - top.state.jump).max())
@@ -434,6 +442,33 @@ class FailurePath(EquilibriumPath):
         if higher:
             vars(self).update(vars(other), ran_on=True)
         return higher
+
+    def step_over(self) -> bool:
+        """Continue from an equilibrium at a level just above the highest one to which relaxation
+        leads without growth of the crack, and from which a branch leads higher; whether there is
+        one. Where a point releases its shear the branch ends, or its level falls, and no crack
+        grows.
+        """
+        if not (self.to_growth and self.points) or self.crushed:
+            return False
+        top = self.points[self.top]
+        ends = (self.relaxed(top, 2**power * PRECISION) for power in range(RISES))
+        end = next((end for end in ends if end and not end.has_grown(top)), None)
+        if end is None:
+            return False
+        other = self.copied()
+        other.cut_after(self.top)
+        other.pass_to(end)
+        other.stepped_to = [*self.stepped_to, end]
+        leads_on = other.advance_branch() and other.points[-1].level > end.level
+        if leads_on:
+            vars(self).update(vars(other))
+        return leads_on
+
+    @property
+    def level_above(self) -> float:
+        """The level above its highest one, up to the target, that a run must not reach [m]."""
+        return min((1 + ABOVE) * self.highest, self.target)
 
     def run_to(self, level: float, before: LoadStepper | None = None) -> LoadStepper:
         """A run from the beginning to a level [m], by all strategies of a run, or the one before to
@@ -483,23 +518,27 @@ class FailurePath(EquilibriumPath):
         number = len(self.points)
         if not self.entering or not self.points:
             return number
-        uplifts = np.array([point.uplifts for point in self.points])
+        filled = np.array([point.filled for point in self.points])
         lower = np.array([point.level for point in self.points]) < self.points[-1].level
-        largest = uplifts[lower].max(axis=0, initial=0.0)
-        for joint in np.flatnonzero(uplifts[-1] < (1 - WITHDRAWN) * largest):
-            full = lower & (uplifts[:, joint] == largest[joint])
+        largest = filled[lower].max(axis=0, initial=0.0)
+        for joint in np.flatnonzero(filled[-1] < (1 - WITHDRAWN) * largest):
+            full = lower & (filled[:, joint] == largest[joint])
             number = min(number, int(np.argmax(full)) + 1)
         return number
 
     def has_full_uplift(self, history: History) -> BoolArray:
-        """In which steps of a history no joint has less uplift than on the path, before the water
-        withdraws.
+        """In which steps of a history the water reaches as far in all joints as on the path, before
+        it withdraws.
         """
-        full = np.full(len(history.rows["level"]), True)
-        for joint in range(len(self.case.joints)):
-            name = column_of("U", joint)
-            largest = max(point.last[name] for point in self.admissible)
-            full &= np.array(history.rows[name]) >= (1 - ROUND_OFF) * largest
+        rows, equilibrium = history.rows, self.stepper.model.equilibrium
+        full = np.full(len(rows["level"]), True)
+        for number, joint in enumerate(equilibrium.interface.joints):
+            largest = max(point.filled[number] for point in self.admissible)
+            uplifts = joint.width * np.array(rows[column_of("U", number)])
+            shares = filled_part(
+                joint, equilibrium.unit_weight, uplifts, rows["level"], rows["tail_level"]
+            )
+            full &= shares >= (1 - ROUND_OFF) * largest
         return full
 
     def opens_beyond(self, history: History) -> bool:
@@ -511,7 +550,26 @@ class FailurePath(EquilibriumPath):
     @property
     def grows(self) -> bool:
         """Whether a crack has grown unstably: the level has fallen, or the branch has ended."""
-        return bool(self.starts) or self.growth_until(len(self.points)) is not None
+        return bool(self.jumps) or self.growth_until(len(self.points)) is not None
+
+    @property
+    def jumps(self) -> list[int]:
+        """The numbers of the first points of branches that are reached by unstable growth."""
+        known = set(map(id, self.stepped_to))
+        return [number for number in self.starts if id(self.points[number]) not in known]
+
+    def first_branch(self) -> FailurePath:
+        """The path up to the first unstable growth by which it has passed to another branch."""
+        other = self.copied()
+        other.cut_after(self.jumps[0] - 1)
+        other.ended = True
+        return other
+
+    @property
+    def varies(self) -> bool:
+        """Whether paths by longer increments have had quite another highest level."""
+        lowest, highest = self.interval
+        return highest - lowest > ABOVE * highest
 
     @property
     def passed_growth(self) -> float | None:
@@ -534,6 +592,21 @@ class FailurePath(EquilibriumPath):
             if self.crushes(self.points[number]):
                 del self.points[number + 1 :]
                 return
+
+    def refine_fall(self) -> None:
+        """Insert points of the branch where the level may be lowest beyond its highest one, as long
+        as it may have fallen unstably there: increments are so long that the level is nearly in
+        line, to a part of that fall.
+        """
+        for _ in range(MOST_REFINED):
+            fallen = self.unstable_fall * self.highest
+            bounds = [(-self.bound(n, -1), n) for n in range(self.top, len(self.points) - 1)]
+            possible, first = min(bounds, default=(self.highest, self.top))
+            known = self.levels[self.top :].min()
+            near = known - possible <= EXACT * fallen
+            if near or possible > self.highest - fallen or known < self.highest - fallen:
+                return
+            self.insert(first, self.between(first))
 
     def uncertain(self) -> tuple[int, float]:
         """See `EquilibriumPath.uncertain`: also where it passes the target or f_c."""
