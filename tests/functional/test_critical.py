@@ -387,20 +387,22 @@ def test_a_branch_that_ends_where_water_enters_ends_in_unstable_crack_growth(ope
 
 
 @pytest.mark.heavy
-def test_a_path_is_continued_from_a_run_where_water_enters():
+@pytest.mark.parametrize(("first", "highest"), [(16.989, 83.688), (28.3, 84.0267)])
+def test_a_path_is_continued_from_a_run_where_water_enters(first, highest):
     """Each element that the water enters turns the path, which ended at 80.11 m, while runs stand
     above, with as much uplift: no level was confirmed. The whole joint slips at 83.69 m (by
-    shorter increments at 84.03 m, which is not confirmed).
+    shorter increments at 84.03 m, which is not confirmed). From 28.3 m a run stops at 80.11 m,
+    which was confirmed; from a lower first level it does not.
     """
     section = {"dam_height": 56.63, "dam_base": 52.15, "dam_crest": 7.059, "n_joint": 20}
     joint = {"K_N": 6.984e11, "K_T": 4.486e11, "adhesion": 437.9e3, "sigma_max": 593.7e3}
     joint |= {"law": "friction", "mu": 1.161, "uplift": "cracked", "drains": 1, "drain_x": 5.163}
     concrete = {"E": 2.95e10, "E_found": 4.137e9, "nu": 0.1463}
-    search = Search(load("dam", section | joint | concrete, "16.989", "0"), "level")
-    path, _ = finished(search.path(16.989, search.base, 100.0, to_growth=True))
+    search = Search(load("dam", section | joint | concrete, f"{first}", "0"), "level")
+    path, _ = finished(search.path(first, search.base, 100.0, to_growth=True))
     begin = next(point for point in path.points if len(point.model.case.levels) > 1)
     assert begin.level < 80.2 and path.has_full_uplift(path.points[path.top].history)[-1]
-    assert path.ran_on and path.slides and path.highest == pytest.approx(83.688, rel=1e-4)
+    assert path.ran_on and path.slides and path.highest == pytest.approx(highest, rel=1e-4)
 
 
 def test_uplift_is_full_where_the_water_reaches_as_far_in_all_joints_as_before_it_withdraws():
@@ -679,11 +681,12 @@ def test_no_way_is_followed_twice_and_levels_with_less_uplift_do_not_count(monke
 
 
 @pytest.mark.heavy
-def test_a_limit_point_confirms_another_quantity_than_the_level(solve):
-    """The path with a lighter dam falls before any mechanism; shorter increments do the same."""
+def test_a_path_whose_level_falls_confirms_another_quantity_than_the_level(solve):
+    """That with a lighter dam, to the mechanism: as it falls the water withdraws from the crack."""
     settings = {"law": "rupture", "uplift": "cracked", "n_joint": 10.0}
     _, answer = search_result("dam", "rho_dam", settings, "30,42")
-    assert answer.confirmed and answer.why.startswith("there the level has a limit point")
+    assert answer.confirmed and answer.mode == "overturning"
+    assert answer.why.startswith("the equilibrium path reaches 41.99")
     for factor, stands in ((1.003, True), (0.997, False)):
         (run,) = solve("dam", "30,42", **settings, rho_dam=factor * answer.value)
         assert (verdict(run) == "stands") is stands

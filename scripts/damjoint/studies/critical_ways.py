@@ -8,14 +8,12 @@ from dataclasses import dataclass, replace
 from ..input.case import Case
 from ..solver.path import FALL
 from .critical_value import CriticalValue
-from .failure_path import FailurePath
+from .failure_path import LOWER_BEGIN, FailurePath
 
-#: First level of the path that begins lower, over that of the case [-].
-LOWER_BEGIN = 0.6
 #: The level up to which the levels are prescribed to pass over a growth, over that of the growth.
 ABOVE_GROWTH = 1.02
-#: Factor by which the fall that is unstable growth is changed, down and up [-]: it varies by a
-#: quarter with the increments.
+#: Factor by which the fall that is unstable growth is changed, down and up [-]: to this part of it
+#: it is known how far the level falls.
 FALL_FACTOR = 1.05
 
 

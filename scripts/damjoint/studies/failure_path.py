@@ -29,6 +29,7 @@ from ..solver.path import (
     FALL,
     LEVEL_RISE,
     MOST_REFINED,
+    NEAR_HIGHEST,
     PRECISION,
     RISE,
     SURE,
@@ -61,6 +62,9 @@ SOFTENED = 0.1
 FEW = 5
 #: How often a step of the level is halved at most, until its two halves lead to the same state.
 HALVINGS = 4
+
+#: First level of a path or run that begins lower, over that of the case [-].
+LOWER_BEGIN = 0.6
 
 #: At how many levels, of twice the rise each, relaxation is tried just above the highest one.
 RISES = 4
@@ -472,7 +476,8 @@ class FailurePath(EquilibriumPath):
 
     def run_to(self, level: float, before: LoadStepper | None = None) -> LoadStepper:
         """A run from the beginning to a level [m], by all strategies of a run, or the one before to
-        a lower level, continued.
+        a lower level, continued. Where water enters the crack a run may stop by chance: one that
+        does is tried from a lower first level, too.
         """
         if level in self.runs:
             return self.runs[level]
@@ -481,12 +486,20 @@ class FailurePath(EquilibriumPath):
         if levels[-1] < level:
             levels, tails = (*levels, level), (*tails, tails[-1])
         case = varied(case, self.solver, levels, tails)
-        run = before.fork(case) if before else LoadStepper(case, self.interface)
+        run = self.finished_run(before.fork(case) if before else LoadStepper(case, self.interface))
+        if run.stopped and self.entering and not before:
+            lower = varied(case, {}, (LOWER_BEGIN * levels[0], *levels[1:]), tails)
+            other = self.finished_run(LoadStepper(lower, self.interface))
+            run = run if other.stopped else other
+        self.runs[level] = run
+        return run
+
+    def finished_run(self, run: LoadStepper) -> LoadStepper:
+        """A run, at the end of its levels or stopped."""
         run.predicts = self.predicts
         for state in run.steps():
             if run.path_ended and state.loading.level > (1 - PRECISION) * self.highest:
                 run.path_begin = state  # both paths have ended: no other one is begun from there
-        self.runs[level] = run
         return run
 
     def decided(self, factor: float) -> bool:
@@ -514,12 +527,13 @@ class FailurePath(EquilibriumPath):
 
     @property
     def counted(self) -> int:
-        """The number of points up to the largest uplift, if the water withdraws after it."""
-        number = len(self.points)
-        if not self.entering or not self.points:
+        """The number of points up to the largest uplift, if the water withdraws after it: far below
+        the highest level it does as the dam fails.
+        """
+        number, levels = len(self.points), np.array([point.level for point in self.points])
+        if not self.entering or not number or levels[-1] < NEAR_HIGHEST * levels.max():
             return number
-        filled = np.array([point.filled for point in self.points])
-        lower = np.array([point.level for point in self.points]) < self.points[-1].level
+        filled, lower = np.array([point.filled for point in self.points]), levels < levels[-1]
         largest = filled[lower].max(axis=0, initial=0.0)
         for joint in np.flatnonzero(filled[-1] < (1 - WITHDRAWN) * largest):
             full = lower & (filled[:, joint] == largest[joint])
