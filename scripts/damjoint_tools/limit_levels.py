@@ -9,16 +9,14 @@ base, all laws and uplifts. The same command continues a file, and prints what i
 from __future__ import annotations
 
 import argparse
-import os
 import time
-from collections.abc import Iterator
-from concurrent.futures import as_completed
+from functools import partial
 from pathlib import Path
 from statistics import median
 
 from damjoint import InputError
 from damjoint.input.resolve import load
-from damjoint.processes import process_pool
+from damjoint.processes import as_finished, check_jobs, process_count
 from damjoint.progress import track
 from damjoint.solver.path import PRECISION, RISE
 from damjoint.studies.critical import Search
@@ -113,25 +111,18 @@ def limit_levels(count: int, seed: int, out: Path, jobs: int | None = None) -> l
 
     Raises InputError, also if the rows in the file were computed by other code.
     """
+    check_jobs(jobs)
     now, about = provenance(), {"rows": count, "seed": seed}
     columns = COLUMNS, tuple(name for name in COLUMNS if name.startswith("cpu"))
     with rows_session("limit levels", out, *columns, {"limit_levels": about}) as (study, done):
         same_code(out, done.values(), now)
         missing = [n for n in range(count) if name_of(seed, n) not in done]
-        for row in track(rows_as_completed(seed, missing, jobs), "limit levels", len(missing)):
+        rows = as_finished(partial(row_of, seed), missing, process_count(jobs, len(missing)) or 1)
+        for _, row in track(rows, "limit levels", len(missing)):
             cells = row | now
             study.add([str(cells.get(name, "")) for name in COLUMNS])
         done = study.file.read()
     return [done[name_of(seed, n)] for n in range(count)]
-
-
-def rows_as_completed(
-    seed: int, numbers: list[int], jobs: int | None
-) -> Iterator[dict[str, object]]:
-    """Compute the rows of dams in parallel, in the order in which they are finished."""
-    with process_pool(jobs or os.cpu_count() or 1) as pool:
-        waiting = [pool.submit(row_of, seed, number) for number in numbers]
-        yield from (future.result() for future in as_completed(waiting))
 
 
 def doubtful(row: dict[str, str], way: int) -> bool:
@@ -151,15 +142,16 @@ def summary(rows: list[dict[str, str]]) -> list[str]:
     """What the rows say of each law: a table, and the dams that do not agree."""
     lines = ["law       dams  not confirmed   largest spread   CPU s median, largest"]
     for law in LAWS:
-        own = [row for row in rows if row["law"] == law]
-        if not own:
+        with_law = [row for row in rows if row["law"] == law]
+        if not with_law:
             continue
-        searches = [(row, way) for row in own for way in range(len(WAYS))]
+        count = len(with_law)
+        searches = [(row, way) for row in with_law for way in range(len(WAYS))]
         doubts = sum(doubtful(row, way) for row, way in searches)
         times = [float(row[f"cpu_{way}"]) for row, way in searches]
         lines.append(
-            f"{law:9} {len(own):4}  {doubts:3} of {len(searches):3} {doubts / len(searches):6.1%}  "
-            f"{max(map(spread, own)):14.1e}   {median(times):.1f}, {max(times):.0f}"
+            f"{law:9} {count:4}  {doubts:3} of {len(searches):3} {doubts / len(searches):6.1%}  "
+            f"{max(map(spread, with_law)):14.1e}   {median(times):.1f}, {max(times):.0f}"
         )
     for row in rows:
         ways = range(len(WAYS))

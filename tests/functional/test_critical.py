@@ -49,6 +49,12 @@ RUPTURE = DAM | {"law": "rupture"}
 UNBONDED = {"law": "bond", "sigma_max": 0.0, "adhesion": 0.0}
 
 
+def no_higher_level(monkeypatch):
+    """Neither a rise of the level nor relaxation leads on from the highest one."""
+    for way in ("rise_on", "step_over"):
+        monkeypatch.setattr(FailurePath, way, lambda self: False)
+
+
 def search_result(case, of="level", settings=None, levels=None, tail_levels=None, rise=1.0):
     """rise: of the level that an increment aims at, over the usual one."""
     search = Search(load(case, settings, levels, tail_levels), of)
@@ -292,8 +298,7 @@ def test_a_limit_without_a_mechanism_is_not_confirmed(monkeypatch, command):
     monkeypatch.setattr(FailurePath, "advance_branch", lambda self: False)
     ends = lambda self, last: vars(self).update(ended=True)
     monkeypatch.setattr(FailurePath, "pass_over", ends)
-    for way in ("rise_on", "step_over"):
-        monkeypatch.setattr(FailurePath, way, lambda self: False)
+    no_higher_level(monkeypatch)
     code, out, _ = command("critical", "c", "--set", "pena_tang=0", "--levels", "6,8")
     # the interval has the highest levels of all three repetitions
     assert code == 3 and "critical level 6 m, not confirmed: between 6 and 6.625 m" in out
@@ -309,8 +314,7 @@ def test_the_end_of_a_branch_above_which_a_run_stands_is_not_confirmed(monkeypat
     )
     ends = lambda self, last: vars(self).update(ended=True)
     monkeypatch.setattr(FailurePath, "pass_over", ends)
-    for way in ("rise_on", "step_over"):
-        monkeypatch.setattr(FailurePath, way, lambda self: False)
+    no_higher_level(monkeypatch)
     monkeypatch.setattr(FailurePath, "repeated", lambda self: None)
     _, answer = search_result("c", settings={"pena_tang": 0.0}, levels="3,4")
     assert answer.growth == answer.value < 5.1 and not answer.confirmed
@@ -496,8 +500,7 @@ def test_no_bound_of_statics_confirms_what_a_run_passes_where_water_enters(monke
     )
     ends = lambda self, last: vars(self).update(ended=True)
     monkeypatch.setattr(FailurePath, "pass_over", ends)
-    for way in ("rise_on", "step_over"):
-        monkeypatch.setattr(FailurePath, way, lambda self: False)
+    no_higher_level(monkeypatch)
     monkeypatch.setattr(FailurePath, "run_on", lambda self: False)
     monkeypatch.setattr(FailurePath, "repeated", lambda self: None)
     settings = {"pena_tang": 0.0, "uplift": "cracked"}
@@ -529,8 +532,7 @@ def test_statics_confirms_a_level_near_its_bound(monkeypatch):
     """Only where the search does not progress; the value is that of an equilibrium."""
     monkeypatch.setattr(FailurePath, "advance", lambda self: vars(self).update(ended=True))
     monkeypatch.setattr(FailurePath, "repeated", lambda self: None)
-    for way in ("rise_on", "step_over"):
-        monkeypatch.setattr(FailurePath, way, lambda self: False)
+    no_higher_level(monkeypatch)
     monkeypatch.setattr(failure_path, "SOFTENED", np.inf)
     settings = NO_TENSION | {"n_joint": 20.0}
     _, answer = search_result("i", settings=settings, levels="9.95,10.1")
@@ -1102,8 +1104,7 @@ def test_a_path_begins_as_a_run_where_single_steps_do_not_lead(monkeypatch):
     search, answer = search_result("dam", settings=RUPTURE | NO_TENSION, levels="20")
     first = search.trials[0].path
     assert first.begun_by_run and first.points[0].level == 20 and answer.value > 20
-    for way in ("rise_on", "step_over"):
-        monkeypatch.setattr(FailurePath, way, lambda self: False)
+    no_higher_level(monkeypatch)
     monkeypatch.setattr(FailurePath, "advance", lambda self: setattr(self, "ended", True))
     _, answer = search_result("dam", settings=RUPTURE | NO_TENSION, levels="20")
     assert not answer.confirmed and "falls from the first equilibrium on, at 20 m" in answer.doubt
@@ -1211,8 +1212,7 @@ def test_the_interval_has_the_highest_level_of_every_path(monkeypatch):
         return half(self)
 
     monkeypatch.setattr(FailurePath, "by_shorter", lower)
-    for way in ("rise_on", "step_over"):
-        monkeypatch.setattr(FailurePath, way, lambda self: False)
+    no_higher_level(monkeypatch)
     monkeypatch.setattr(Search, "after_growth", lambda self, path: ({}, path))
     search, answer = search_result("dam", settings=SNAP_BACKS[0])
     low, high = search.trials[-1].path.interval

@@ -13,7 +13,7 @@ displacement, is a mechanism.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import ROUND_OFF
-from ..arrays import Array
+from ..arrays import Array, BoolArray
 from ..input.case import Case
 from ..joint.interface import JointInterface
 from ..laws.base import Law
@@ -367,18 +367,16 @@ class Point:
         """Whether tension of more than the part FALL of the water's thrust has been lost since
         another equilibrium by points that soften in a single increment.
         """
-        tension = [law.tensile_strength for law in self.laws]
-        return self.lost(begin, tension, begun=False) > FALL * self.thrust
+        lost = self.lost(begin, self.tensile_strengths, self.softened_at_once(begin))
+        return lost > FALL * self.thrust
 
     def has_grown(self, begin: Point) -> bool:
         """Whether a crack has grown since another equilibrium at nearly the same level: tension of
         more than the part FALL of the water's thrust is lost, or more uplift has entered.
         """
         entered = (self.uplifts - begin.uplifts).max(initial=0.0)
-        lost = self.model.equilibrium.interface.weights * np.maximum(self.damage - begin.damage, 0)
-        parts = zip(self.laws, self.state.variables.split(lost), strict=True)
-        tension = sum(law.tensile_strength * part.sum() for law, part in parts if law.softens)
-        return bool(max(tension, entered) > FALL * self.thrust)
+        lost = self.lost(begin, self.tensile_strengths, self.damage > begin.damage)
+        return bool(max(lost, entered) > FALL * self.thrust)
 
     def opens_at_once(self, begin: Point) -> bool:
         """Whether a point has lost most of its tensile strength since another equilibrium."""
@@ -394,7 +392,8 @@ class Point:
         for law in self.laws:
             shear = law.intact_cohesion
             strengths.append(law.tensile_strength + (shear if shear < np.inf else 0.0))
-        return self.level * self.lost(begin, strengths, begun=True) / self.thrust
+        counts = self.softened_at_once(begin) | (begin.damage == 0)
+        return self.level * self.lost(begin, strengths, counts) / self.thrust
 
     @cached_property
     def opens_points(self) -> bool:
@@ -409,16 +408,23 @@ class Point:
         """The law of each joint."""
         return self.model.equilibrium.laws.laws
 
-    def lost(self, begin: Point, strengths: Sequence[float], begun: bool) -> float:
-        """The strength [N] that points have lost since another equilibrium which soften by much in
-        the increment or, if begun is true, begin to; strengths [Pa]: of each joint.
-        """
-        growth = self.damage - begin.damage
-        equilibrium = self.model.equilibrium
-        releases = equilibrium.laws.releases_shear
+    @property
+    def tensile_strengths(self) -> list[float]:
+        """The tensile strength of each joint [Pa]."""
+        return [law.tensile_strength for law in self.laws]
+
+    def softened_at_once(self, begin: Point) -> BoolArray:
+        """Which points (q,) have softened by much since another equilibrium."""
+        releases = self.model.equilibrium.laws.releases_shear
         largest = LARGEST_GROWTH_OF_RELEASE if releases else LARGEST_GROWTH
-        counts = (growth > largest) | (begun & (begin.damage == 0))
-        lost = equilibrium.interface.weights * np.where(counts, growth, 0)
+        return np.asarray(self.damage - begin.damage > largest)
+
+    def lost(self, begin: Point, strengths: Sequence[float], counts: BoolArray) -> float:
+        """The strength [N] that points have lost since another equilibrium; strengths [Pa]: of each
+        joint; counts (q,): which points.
+        """
+        weights = self.model.equilibrium.interface.weights
+        lost = weights * np.where(counts, self.damage - begin.damage, 0)
         if not lost.any():
             return 0.0
         parts = zip(self.laws, strengths, self.state.variables.split(lost), strict=True)
@@ -846,14 +852,14 @@ class EquilibriumPath:
         number, again = len(self.points), 0
         while number - 1 - again in self.starts:
             again += 1
-        return self.relaxed_above(last, range(again, -1, -1))
+        return next(self.relaxed_above(last, range(again, -1, -1)), None)
 
-    def relaxed_above(self, last: Point, powers: Iterable[int]) -> Point | None:
-        """The first of `relaxed` at levels that are higher by the precision times these powers of
-        2; None if there is none.
+    def relaxed_above(self, last: Point, powers: Iterable[int]) -> Iterator[Point]:
+        """Those of `relaxed` that there are at levels higher by the precision times these powers of
+        2.
         """
         points = (self.relaxed(last, 2**power * PRECISION) for power in powers)
-        return next((point for point in points if point), None)
+        return filter(None, points)
 
     def relaxed(self, last: Point, rise: float) -> Point | None:
         """The equilibrium to which relaxation leads at a level higher than a point's by a relative

@@ -394,16 +394,14 @@ class FailurePath(EquilibriumPath):
         self.filled_on = [*self.filled_on, top]
         other = self.copied()
         other.cut_after(self.top)
-        other.pass_to(other.relaxed_above(other.points[-1], range(RISES)))
+        other.pass_to(next(other.relaxed_above(top, range(RISES)), None))
         if not other.ended:
             other.advance()
             self.leads_higher = other.ended
         if other.ended:
             self.dry_beyond = top
-            return
-        self.points, self.starts, self.closed = other.points, other.starts, other.closed
-        self.growth, self.over, self.crawled = other.growth, other.over, other.crawled
-        self.ended = False
+        else:
+            vars(self).update(vars(other), leads_higher=False)
 
     def rise_on(self) -> bool:
         """Continue from the highest level by rises of it that belong to the branch, each twice as
@@ -456,8 +454,8 @@ class FailurePath(EquilibriumPath):
         if not (self.to_growth and self.points) or self.crushed:
             return False
         top = self.points[self.top]
-        ends = (self.relaxed(top, 2**power * PRECISION) for power in range(RISES))
-        end = next((end for end in ends if end and not end.has_grown(top)), None)
+        ends = self.relaxed_above(top, range(RISES))
+        end = next((end for end in ends if not end.has_grown(top)), None)
         if end is None:
             return False
         other = self.copied()
