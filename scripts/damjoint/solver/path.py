@@ -192,7 +192,7 @@ class Point:
     #: what was prescribed: level, crest, zone or heel
     control: str = "level"
 
-    @property
+    @cached_property
     def level(self) -> float:
         """The reservoir's level [m]."""
         return self.state.loading.level
@@ -241,8 +241,8 @@ class Point:
         """Whether it slides, and no other history and no smaller opening, with less water in it,
         has a higher level.
         """
-        equilibrium = self.model.equilibrium
-        return self.slides and not (equilibrium.path_dependent or equilibrium.flowing)
+        path_dependent = self.model.equilibrium.path_dependent
+        return self.slides and not (path_dependent or self.uplift_follows)
 
     @cached_property
     def compressions(self) -> list[float]:
@@ -374,9 +374,14 @@ class Point:
         """Whether a crack has grown since another equilibrium at nearly the same level: tension of
         more than the part FALL of the water's thrust is lost, or more uplift has entered.
         """
-        entered = (self.uplifts - begin.uplifts).max(initial=0.0)
         lost = self.lost(begin, self.tensile_strengths, self.damage > begin.damage)
-        return bool(max(lost, entered) > FALL * self.thrust)
+        return max(lost, self.entered(begin)) > FALL * self.thrust
+
+    def entered(self, begin: Point) -> float:
+        """The largest uplift of a joint [N] that has entered since another equilibrium, beyond that
+        of the level's rise.
+        """
+        return float(((self.filled - begin.filled) * self.heads).max(initial=0.0))
 
     def opens_at_once(self, begin: Point) -> bool:
         """Whether a point has lost most of its tensile strength since another equilibrium."""
@@ -386,22 +391,29 @@ class Point:
 
     def hidden_rise(self, begin: Point) -> float:
         """By how much the level may be higher between another equilibrium and this one [m]: up to
-        the strength that is lost by points that begin to soften in between.
+        the strength that is lost by points that begin to soften in between, and the uplift of more
+        than the part FALL of the water's thrust that enters.
         """
         strengths = list[float]()
         for law in self.laws:
             shear = law.intact_cohesion
             strengths.append(law.tensile_strength + (shear if shear < np.inf else 0.0))
         counts = self.softened_at_once(begin) | (begin.damage == 0)
-        return self.level * self.lost(begin, strengths, counts) / self.thrust
+        entered = self.entered(begin)
+        entered = entered if entered > FALL * self.thrust else 0.0
+        return self.level * (self.lost(begin, strengths, counts) + entered) / self.thrust
 
     @cached_property
     def opens_points(self) -> bool:
         """Whether points are opened one by one: there is a law whose shear opening releases, and
         the uplift does not follow the opening.
         """
-        follows = any(joint["uplift"] in ("cracked", "flow") for joint in self.model.case.joints)
-        return self.model.equilibrium.laws.releases_shear and not follows
+        return self.model.equilibrium.laws.releases_shear and not self.uplift_follows
+
+    @cached_property
+    def uplift_follows(self) -> bool:
+        """Whether the uplift of a joint follows its opening."""
+        return any(joint["uplift"] in ("cracked", "flow") for joint in self.model.case.joints)
 
     @property
     def laws(self) -> Sequence[Law[Any]]:
@@ -463,6 +475,16 @@ class Point:
             for joint, uplift in parts
         ]
         return np.concatenate(filled)
+
+    @property
+    def heads(self) -> Array:
+        """The uplift of each joint, full of the reservoir's water, beyond that of the tailwater
+        alone [N].
+        """
+        equilibrium, loading = self.model.equilibrium, self.state.loading
+        joints, weight = equilibrium.interface.joints, equilibrium.unit_weight
+        heads = [heads_of(joint, weight, loading.level, loading.tail)[1] for joint in joints]
+        return np.concatenate(heads)
 
     def uplifts_in(self, state: State) -> Array:
         """The uplift in each joint in another state [N]."""
@@ -583,6 +605,9 @@ class EquilibriumPath:
         self.longest = np.inf
         #: intervals in which no increment leads to a state of the branch, by the points before them
         self.closed = list[Point]()
+        #: the bounds of the level between its points, see `bound`: with the points that they follow
+        #: from, by their identities
+        self.bounds = dict[tuple[int, ...], tuple[tuple[Point, ...], float]]()
         #: the steps of this path and its copies
         self.solved: Solved = {} if solved is None else solved
 
@@ -1082,10 +1107,20 @@ class EquilibriumPath:
         """An upper bound of the level [m] between a point and the next one; -inf where no point can
         be inserted. sign: -1 for the bound of its negative, by the slopes alone.
         """
-        a, b = self.points[first], self.points[first + 1]
+        a, b = self.points[first : first + 2]
         closed = any(a is point for point in self.closed)
         if b.control in BY_LEVEL or first + 1 in self.starts or closed:
             return -np.inf
+        near = tuple(self.points[max(first - 1, 0) : first + 3])
+        on_branch = tuple(number not in self.starts for number in (first, first + 2))
+        key = (*map(id, near), first > 0, *on_branch, sign)
+        if key not in self.bounds:
+            self.bounds[key] = near, self.new_bound(first, sign)
+        return self.bounds[key][1]
+
+    def new_bound(self, first: int, sign: int) -> float:
+        """See `bound`, which has those that are known."""
+        a, b = self.points[first : first + 2]
         if sign < 0:
             return self.bound_by_slopes(first, sign)
         before, chord = self.slope(first - 1), (b.level - a.level) / (self.length(first) or 1.0)
@@ -1150,14 +1185,24 @@ def filled_part(
 
     unit_weight: of the water [N/m3]; uplifts: [N], levels and tails: [m], k of each.
     """
+    tail, head = heads_of(joint, unit_weight, levels, tails)
+    return (np.atleast_1d(uplifts) - tail) / head
+
+
+def heads_of(
+    joint: JointInterface, unit_weight: float, levels: ArrayLike, tails: ArrayLike
+) -> tuple[Array, Array]:
+    """The uplift of the tailwater alone on a joint, and that of the reservoir beyond it [N], (k,)
+    each; see `filled_part`.
+    """
     heights = joint.points.positions[:, 1]
 
     def static(levels: ArrayLike) -> Array:
-        return np.maximum(np.atleast_1d(levels)[:, None] - heights, 0) @ joint.points.weights
+        depths = np.maximum(np.atleast_1d(levels)[:, None] - heights, 0)
+        return unit_weight * (depths @ joint.points.weights)
 
     tail = static(tails)
-    head = unit_weight * np.maximum(static(levels) - tail, ROUND_OFF)
-    return (np.atleast_1d(uplifts) - unit_weight * tail) / head
+    return tail, np.maximum(static(levels) - tail, unit_weight * ROUND_OFF)
 
 
 def deviation(change: float, predicted: float, least: float) -> float:

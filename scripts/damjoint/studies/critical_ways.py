@@ -68,6 +68,8 @@ def ways_to_confirm(
         ways += (path, lower_begin(path.case)), (path, LONGER)
     elif grows_unstably and enters and not first.to_growth:  # long ones may pass it over
         ways.append((path, replace(lower_begin(path.case), share=SHORTER.share)))
+        if path.passed_growth is not None:  # to which branch depends on them, too
+            ways.append((path, LONGER))
     return list(dict.fromkeys(ways))
 
 

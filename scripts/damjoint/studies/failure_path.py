@@ -66,6 +66,9 @@ HALVINGS = 4
 #: First level of a path or run that begins lower, over that of the case [-].
 LOWER_BEGIN = 0.6
 
+#: Largest rise of the level in a step of a run, over its last level.
+RUN_RISE = 0.05
+
 #: At how many levels, of twice the rise each, relaxation is tried just above the highest one.
 RISES = 4
 #: The part by which a joint is less filled under a rising level where the water withdraws.
@@ -139,7 +142,7 @@ class FailurePath(EquilibriumPath):
         #: whether it has been continued from a run, see `run_on`
         self.ran_on = False
         #: the runs from the beginning, by the level to which they were to lead
-        self.runs = dict[float, LoadStepper]()
+        self.runs: dict[float, LoadStepper] = known.runs if known else {}
         #: the part of a joint that may open or soften before a displacement is prescribed
         self.most_softened = SOFTENED * rise / RISE
         #: whether the loads of a time are those of the last one, but for the level
@@ -260,10 +263,10 @@ class FailurePath(EquilibriumPath):
 
     @property
     def ends(self) -> bool:
-        """Whether its branch ends at the highest level; where water enters the crack another
-        element may follow.
+        """Whether its branch ends at the highest level, and the joint does not slide there; where
+        water enters the crack another element may follow.
         """
-        return self.stops and not self.entering
+        return self.stops and not (self.entering or self.slides)
 
     @property
     def branch_ends(self) -> bool:
@@ -318,7 +321,8 @@ class FailurePath(EquilibriumPath):
         """
         levels = super().levels
         if any(map(self.complete, self.points)):
-            levels[[not self.on_path(point) for point in self.points]] = -np.inf
+            by_level = [n for n, point in enumerate(self.points) if point.control == "level"]
+            levels[[n for n in by_level if not self.on_path(self.points[n])]] = -np.inf
         return levels
 
     def complete(self, point: Point) -> bool:
@@ -473,21 +477,26 @@ class FailurePath(EquilibriumPath):
         return min((1 + ABOVE) * self.highest, self.target)
 
     def run_to(self, level: float, before: LoadStepper | None = None) -> LoadStepper:
-        """A run from the beginning to a level [m], by all strategies of a run, or the one before to
-        a lower level, continued. Where water enters the crack a run may stop by chance: one that
-        does is tried from a lower first level, too.
+        """A run from the beginning to a level [m], by all strategies of a run and steps of RUN_RISE
+        at most, or the one before to a lower level, continued; one to the same level, to the
+        precision, is the same. Where water enters the crack a run may stop by chance: one that does
+        is tried from a lower first level, too, by long steps.
         """
-        if level in self.runs:
-            return self.runs[level]
+        for known, run in self.runs.items():
+            if abs(known - level) <= PRECISION * level:
+                return run
         case = before.case if before else self.case
         levels, tails = tuple(min(known, level) for known in case.levels), case.tail_levels
+        lower = LOWER_BEGIN * levels[0], *levels[1:]
         if levels[-1] < level:
-            levels, tails = (*levels, level), (*tails, tails[-1])
-        case = varied(case, self.solver, levels, tails)
+            count = int(np.ceil((level - levels[-1]) / (RUN_RISE * level)))
+            levels += tuple(np.linspace(levels[-1], level, count + 1)[1:])
+            lower, tails = (*lower, level), (*tails, tails[-1])
+        case = varied(case, self.solver, levels, (*tails, *(len(levels) - len(tails)) * tails[-1:]))
         run = self.finished_run(before.fork(case) if before else LoadStepper(case, self.interface))
         if run.stopped and self.entering and not before:
-            lower = varied(case, {}, (LOWER_BEGIN * levels[0], *levels[1:]), tails)
-            other = self.finished_run(LoadStepper(lower, self.interface))
+            case = varied(case, {}, lower, tails)
+            other = self.finished_run(LoadStepper(case, self.interface))
             run = run if other.stopped else other
         self.runs[level] = run
         return run
@@ -504,7 +513,9 @@ class FailurePath(EquilibriumPath):
         """Whether the target is reached, or the dam slides, is crushed or its level has settled; or
         a crack has grown unstably, if that is to be found.
         """
-        if self.reached or self.crushed or self.slides or self.settled(factor):
+        # with less water in it, a joint that slides may do so at a higher level
+        slides = self.slides and not self.points[self.top].uplift_follows
+        if self.reached or self.crushed or slides or self.settled(factor):
             return True
         if self.water_withdraws:  # it may enter again as long as the level rises
             level, highest = self.points[-1].level, max(point.level for point in self.points)
@@ -561,14 +572,19 @@ class FailurePath(EquilibriumPath):
 
     @property
     def grows(self) -> bool:
-        """Whether a crack has grown unstably: the level has fallen, or the branch has ended."""
-        return bool(self.jumps) or self.growth_until(len(self.points)) is not None
+        """Whether a crack has grown unstably: the level has fallen, or the branch has ended; not
+        beyond its highest level if the joint slides there.
+        """
+        count = self.top + 1 if self.slides else len(self.points)
+        return any(n < count for n in self.jumps) or self.growth_until(count) is not None
 
     @property
     def jumps(self) -> list[int]:
-        """The numbers of the first points of branches that are reached by unstable growth."""
-        known = set(map(id, self.stepped_to))
-        return [number for number in self.starts if id(self.points[number]) not in known]
+        """The numbers of the first points of branches that are reached by unstable growth: not of
+        those to which the path has stepped, and not where the whole joint slides before.
+        """
+        known, points = set(map(id, self.stepped_to)), self.points
+        return [n for n in self.starts if not (id(points[n]) in known or points[n - 1].slides)]
 
     def first_branch(self) -> FailurePath:
         """The path up to the first unstable growth by which it has passed to another branch."""
