@@ -1066,27 +1066,43 @@ def test_a_fall_of_the_level_is_seen_by_long_and_by_short_increments():
     assert other.confirmed and other.after["by displacement"] > 1.1 * other.growth
 
 
-def test_the_level_may_rise_in_the_last_interval_as_steeply_as_before_it():
-    """A path whose last increment has hopped over the maximum: the chord of its last interval is
-    flat, but the interval before it is steep.
-    """
-    levels, moved = (140.68, 140.78, 140.785), (0.0, 9.0, 15.0)
+def path_with(levels, moved):
+    """A path of points at these levels [m] and displacements [m]."""
     points = [
         SimpleNamespace(
             level=level,
             control="zone",
             state=SimpleNamespace(jump=np.array([x])),
             hidden_rise=lambda begin: 0.0,
+            rise_before_water=lambda begin: 0.0,
         )
         for level, x in zip(levels, moved, strict=True)
     ]
     curve = path.EquilibriumPath.__new__(path.EquilibriumPath)
     curve.points, curve.starts, curve.closed, curve.bounds = points, [], [], {}
+    return curve
+
+
+def test_the_level_may_rise_in_the_last_interval_as_steeply_as_before_it():
+    """A path whose last increment has hopped over the maximum: the chord of its last interval is
+    flat, but the interval before it is steep.
+    """
+    curve = path_with((140.68, 140.78, 140.785), (0.0, 9.0, 15.0))
     assert curve.bound(1) == pytest.approx(140.78 + 6 * 0.1 / 9)
     assert curve.bound(0) == pytest.approx(140.88)  # its chord is the steepest slope known
-    points[2].hidden_rise = lambda begin: 0.2  # points begin to soften in the last interval
+    curve.points[2].hidden_rise = lambda begin: 0.2  # points begin to soften in the last interval
     curve.bounds.clear()
     assert curve.bound(1) == pytest.approx(140.985)
+
+
+def test_the_level_may_rise_before_water_enters_but_no_steeper_than_before():
+    curve = path_with((140.68, 140.78, 140.785, 140.75), (0.0, 9.0, 15.0, 20.0))
+    before, after = 0.1 / 9, -0.035 / 5
+    where_lines_meet = 140.78 + before * (0.005 - 6 * after) / (before - after)
+    for rise, bound in ((0.0, where_lines_meet), (0.04, 140.825), (0.1, 140.78 + 6 * before)):
+        curve.points[2].rise_before_water = lambda begin, rise=rise: rise
+        curve.bounds.clear()
+        assert curve.bound(1) == pytest.approx(bound, rel=1e-9)
 
 
 @pytest.mark.heavy

@@ -391,17 +391,20 @@ class Point:
 
     def hidden_rise(self, begin: Point) -> float:
         """By how much the level may be higher between another equilibrium and this one [m]: up to
-        the strength that is lost by points that begin to soften in between, and the uplift of more
-        than the part FALL of the water's thrust that enters.
+        the strength that is lost by points that begin to soften in between.
         """
         strengths = list[float]()
         for law in self.laws:
             shear = law.intact_cohesion
             strengths.append(law.tensile_strength + (shear if shear < np.inf else 0.0))
         counts = self.softened_at_once(begin) | (begin.damage == 0)
-        entered = self.entered(begin)
-        entered = entered if entered > FALL * self.thrust else 0.0
-        return self.level * (self.lost(begin, strengths, counts) + entered) / self.thrust
+        return self.level * self.lost(begin, strengths, counts) / self.thrust
+
+    def rise_before_water(self, begin: Point) -> float:
+        """By how much the level may be higher between another equilibrium and this one [m], before
+        the uplift enters that has entered in between.
+        """
+        return self.level * self.entered(begin) / self.thrust
 
     @cached_property
     def opens_points(self) -> bool:
@@ -1124,10 +1127,12 @@ class EquilibriumPath:
         if sign < 0:
             return self.bound_by_slopes(first, sign)
         before, chord = self.slope(first - 1), (b.level - a.level) / (self.length(first) or 1.0)
-        # points that begin to soften may do so after a rise
-        hides = before is not None and before > max(chord, 0.0)
-        hidden = max(a.level, b.level) + b.hidden_rise(a) if hides else -np.inf
-        return max(self.bound_by_slopes(first), hidden)
+        if before is None or before <= max(chord, 0.0):
+            return self.bound_by_slopes(first)
+        # points that begin to soften, and water that enters, may do so after a rise
+        highest = max(a.level, b.level)
+        enters = min(highest + b.rise_before_water(a), a.level + before * self.length(first))
+        return max(self.bound_by_slopes(first), highest + b.hidden_rise(a), enters)
 
     def bound_by_slopes(self, first: int, sign: int = 1) -> float:
         """An upper bound of the level [m], times the sign, between a point and the next one, where
