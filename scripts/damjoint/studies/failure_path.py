@@ -480,24 +480,26 @@ class FailurePath(EquilibriumPath):
         """A run from the beginning to a level [m], by all strategies of a run and steps of RUN_RISE
         at most, or the one before to a lower level, continued; one to the same level, to the
         precision, is the same. Where water enters the crack a run may stop by chance: one that does
-        is tried from a lower first level, too, by long steps.
+        is tried from a lower first level, too, also by long steps.
         """
         for known, run in self.runs.items():
             if abs(known - level) <= PRECISION * level:
                 return run
         case = before.case if before else self.case
         levels, tails = tuple(min(known, level) for known in case.levels), case.tail_levels
-        lower = LOWER_BEGIN * levels[0], *levels[1:]
-        if levels[-1] < level:
-            count = int(np.ceil((level - levels[-1]) / (RUN_RISE * level)))
-            levels += tuple(np.linspace(levels[-1], level, count + 1)[1:])
-            lower, tails = (*lower, level), (*tails, tails[-1])
-        case = varied(case, self.solver, levels, (*tails, *(len(levels) - len(tails)) * tails[-1:]))
-        run = self.finished_run(before.fork(case) if before else LoadStepper(case, self.interface))
-        if run.stopped and self.entering and not before:
-            case = varied(case, {}, lower, tails)
-            other = self.finished_run(LoadStepper(case, self.interface))
-            run = run if other.stopped else other
+        ways = [(levels, RUN_RISE)]
+        if self.entering and not before:
+            lower = LOWER_BEGIN * levels[0], *levels[1:]
+            ways += (lower, RUN_RISE), (lower, 1.0)
+        for first, rise in ways:
+            count = int(np.ceil((level - levels[-1]) / (rise * level)))
+            further = tuple(np.linspace(levels[-1], level, count + 1)[1:])
+            case = varied(case, self.solver, first + further, tails + count * tails[-1:])
+            run = self.finished_run(
+                before.fork(case) if before else LoadStepper(case, self.interface)
+            )
+            if not run.stopped:
+                break
         self.runs[level] = run
         return run
 
