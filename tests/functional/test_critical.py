@@ -391,6 +391,21 @@ def test_a_branch_that_ends_where_water_enters_ends_in_unstable_crack_growth(ope
 
 
 @pytest.mark.heavy
+@pytest.mark.parametrize("first", [11.13, 18.55])
+def test_many_points_that_soften_by_a_little_are_growth(first):
+    """The halves of an increment agreed that passed over a growth at 54.92 m, to 56.67 m, as no
+    single point softened by much in one of them.
+    """
+    section = {"dam_height": 37.1, "dam_base": 33.43, "dam_crest": 5.182, "n_joint": 40}
+    joint = {"K_N": 7.94e10, "K_T": 5.161e10, "mu": 0.974, "adhesion": 45.1e3, "sigma_max": 877e3}
+    joint |= {"law": "rupture", "pena_rupture": 9.82, "alpha": 1.5, "uplift": "none"}
+    concrete = {"E": 1.08e10, "E_found": 4.882e9, "nu": 0.182}
+    _, answer = search_result("dam", settings=section | joint | concrete, levels=f"{first}")
+    assert answer.confirmed and answer.mode == "unstable crack growth"
+    assert answer.growth == answer.value == pytest.approx(54.919, rel=path.PRECISION / 2)
+
+
+@pytest.mark.heavy
 @pytest.mark.parametrize("first", [22.0, 36.6])
 def test_the_level_is_highest_before_water_enters_a_point(first):
     """It falls as the uplift enters the third element, to where the whole joint slips, at 69.804 m:

@@ -374,8 +374,11 @@ class Point:
         """Whether a crack has grown since another equilibrium at nearly the same level: tension of
         more than the part FALL of the water's thrust is lost, or more uplift has entered.
         """
-        lost = self.lost(begin, self.tensile_strengths, self.damage > begin.damage)
-        return max(lost, self.entered(begin)) > FALL * self.thrust
+        return max(self.tension_lost(begin), self.entered(begin)) > FALL * self.thrust
+
+    def tension_lost(self, begin: Point) -> float:
+        """The tensile strength [N] that points have lost since another equilibrium."""
+        return self.lost(begin, self.tensile_strengths, self.damage > begin.damage)
 
     def entered(self, begin: Point) -> float:
         """The largest uplift of a joint [N] that has entered since another equilibrium, beyond that
@@ -438,12 +441,24 @@ class Point:
         """The strength [N] that points have lost since another equilibrium; strengths [Pa]: of each
         joint; counts (q,): which points.
         """
-        weights = self.model.equilibrium.interface.weights
-        lost = weights * np.where(counts, self.damage - begin.damage, 0)
-        if not lost.any():
+        return self.strength_of(np.where(counts, self.damage - begin.damage, 0), strengths)
+
+    def strength_of(self, damage: Array, strengths: Sequence[float]) -> float:
+        """The strength [N] that goes with a damage of all points (q,); strengths: see `lost`."""
+        if not damage.any():
             return 0.0
-        parts = zip(self.laws, strengths, self.state.variables.split(lost), strict=True)
+        weighted = self.model.equilibrium.interface.weights * damage
+        parts = zip(self.laws, strengths, self.state.variables.split(weighted), strict=True)
         return float(sum(strength * part.sum() for law, strength, part in parts if law.softens))
+
+    @cached_property
+    def tension_lost_last(self) -> float:
+        """The tensile strength [N] that points have lost in the last step."""
+        before = self.state.previous
+        if before is None:
+            return 0.0
+        growth = np.maximum(self.damage - np.split(self.irreversible(before), 2)[0], 0)
+        return self.strength_of(growth, self.tensile_strengths)
 
     @property
     def thrust(self) -> float:
@@ -494,10 +509,11 @@ class Point:
         joints = zip(state.pressures, self.model.equilibrium.interface.joints, strict=True)
         return np.array([joint.points.weights @ pressure.points for pressure, joint in joints])
 
-    def prediction_error(self, end: Point, highest: float) -> float:
+    def prediction_error(self, end: Point, highest: float, to_growth: bool) -> float:
         """How far an increment from here is off the extrapolation of the last one, over what is
-        allowed: its jumps, its level and, where the reservoir has not reached a joint, its uplift;
-        inf if there is no last one. highest: level of the path [m].
+        allowed: its jumps, its level, where the reservoir has not reached a joint its uplift, and,
+        to the first unstable growth, the tension that is lost; inf if there is no last one.
+        highest: level of the path [m].
         """
         before, last = self.state.previous, self.movement
         moved = end.state.jump - self.state.jump
@@ -515,6 +531,9 @@ class Point:
             now, then = end.uplifts - self.uplifts, self.uplifts - self.uplifts_in(before)
             off = np.abs(now - ahead * then).max(initial=0.0)
             errors.append(float(off) / (2 * FALL * end.thrust or 1.0))
+        if to_growth:
+            off = abs(end.tension_lost(self) - ahead * self.tension_lost_last)
+            errors.append(off / (2 * FALL * end.thrust))
         return max(errors)
 
     def unloads(self, begin: Point) -> bool:
@@ -971,7 +990,8 @@ class EquilibriumPath:
         """
         if not self.predicts or (self.to_growth and self.leaps(begin, end)) or end.unloads(begin):
             return np.inf
-        return begin.prediction_error(end, max(self.highest, begin.level, end.level))
+        highest = max(self.highest, begin.level, end.level)
+        return begin.prediction_error(end, highest, self.to_growth)
 
     def agree(self, begin: Point, whole: Point, middle: Point, end: Point) -> bool:
         """Whether one step and two halves lead to the same state; up to unstable growth, also
@@ -979,9 +999,13 @@ class EquilibriumPath:
         """
         if self.to_growth and (self.leaps(begin, middle) or self.leaps(middle, end)):
             return False
-        bend = np.abs(middle.uplifts - (begin.uplifts + end.uplifts) / 2).max(initial=0)
-        enters = bend > FALL * middle.thrust and not end.reaches_joint(begin)
-        return not ((self.to_growth and enters) or whole.differs(end, begin))
+        if self.to_growth:
+            bend = np.abs(middle.uplifts - (begin.uplifts + end.uplifts) / 2).max(initial=0)
+            enters = bend > FALL * middle.thrust and not end.reaches_joint(begin)
+            halves = middle.tension_lost(begin), end.tension_lost(middle)
+            if enters or abs(halves[1] - halves[0]) / 2 > FALL * middle.thrust:
+                return False
+        return not whole.differs(end, begin)
 
     def leaps(self, begin: Point, end: Point) -> bool:
         """Whether tension is lost at once in an increment, see `Point.leaps`; where points are

@@ -14,7 +14,7 @@ from .failure_path import LOWER_BEGIN, FailurePath
 ABOVE_GROWTH = 1.02
 #: Factor by which the fall that is unstable growth is changed, down and up [-]: to this part of it
 #: it is known how far the level falls.
-FALL_FACTOR = 1.05
+FALL_FACTOR = 1.02
 
 
 @dataclass(frozen=True)

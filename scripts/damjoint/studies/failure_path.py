@@ -79,7 +79,7 @@ WITHDRAWN = 0.005
 ABOVE = AFTER_GROWTH
 
 #: Precision to which it is sought how far the level falls, over the fall that is unstable.
-EXACT = 0.05
+EXACT = 0.02
 
 #: Time of an increment of displacement, after the last level, where all loads act in full.
 TICK = 1e-3
