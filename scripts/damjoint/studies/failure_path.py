@@ -480,7 +480,8 @@ class FailurePath(EquilibriumPath):
         """A run from the beginning to a level [m], by all strategies of a run and steps of RUN_RISE
         at most, or the one before to a lower level, continued; one to the same level, to the
         precision, is the same. Where water enters the crack a run may stop by chance: one that does
-        is tried from a lower first level, too, also by long steps.
+        is tried from a lower first level, too, also by long steps; if all stop, it is the one that
+        has come farthest.
         """
         for known, run in self.runs.items():
             if abs(known - level) <= PRECISION * level:
@@ -491,15 +492,16 @@ class FailurePath(EquilibriumPath):
         if self.entering and not before:
             lower = LOWER_BEGIN * levels[0], *levels[1:]
             ways += (lower, RUN_RISE), (lower, 1.0)
+        runs = list[LoadStepper]()
         for first, rise in ways:
             count = int(np.ceil((level - levels[-1]) / (rise * level)))
             further = tuple(np.linspace(levels[-1], level, count + 1)[1:])
             case = varied(case, self.solver, first + further, tails + count * tails[-1:])
-            run = self.finished_run(
-                before.fork(case) if before else LoadStepper(case, self.interface)
-            )
+            run = before.fork(case) if before else LoadStepper(case, self.interface)
+            runs.append(self.finished_run(run))
             if not run.stopped:
                 break
+        run = max(runs, key=lambda run: run.state.loading.level)
         self.runs[level] = run
         return run
 
