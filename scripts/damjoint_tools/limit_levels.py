@@ -18,7 +18,8 @@ from damjoint import InputError
 from damjoint.input.resolve import load
 from damjoint.processes import as_finished, check_jobs, process_count
 from damjoint.progress import track
-from damjoint.solver.path import PRECISION, RISE
+from damjoint.solver.path import RISE
+from damjoint.solver.path_point import PRECISION
 from damjoint.studies.critical import Search
 from damjoint.studies.result_file import rows_session
 

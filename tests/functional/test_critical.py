@@ -25,7 +25,7 @@ from damjoint.input.resolve import load, varied
 from damjoint.joint.interface import interface_of
 from damjoint.solver import path
 from damjoint.solver.load_stepper import LoadStepper
-from damjoint.solver.path import PRECISION
+from damjoint.solver.path_point import PRECISION
 from damjoint.statics import gravity
 from damjoint.statics.verdict import highest_by_statics, verdict
 from damjoint.studies import failure_path

@@ -13,7 +13,7 @@ from damjoint.joint import iterative_system
 from damjoint.joint.interface import Interface
 from damjoint.joint.iterative_system import gmres
 from damjoint.solver.load_stepper import LoadStepper
-from damjoint.solver.path import PRECISION
+from damjoint.solver.path_point import PRECISION
 from damjoint.studies import quake_study
 from numpy.testing import assert_allclose
 

@@ -10,7 +10,8 @@ from damjoint.joint.interface import interface_of
 from damjoint.solver.controls import LevelControl
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.solver.model import Model, StepResult
-from damjoint.solver.path import PRECISION, STRENGTH_LOST, SURE, EquilibriumPath, Point
+from damjoint.solver.path import STRENGTH_LOST, SURE, EquilibriumPath
+from damjoint.solver.path_point import PRECISION, Point
 from damjoint.statics.hints import hints, hints_on_path
 from damjoint.statics.statement import level_of_growth, statement
 from damjoint.statics.verdict import verdict

@@ -19,7 +19,8 @@ from .controls import Control, DissipationControl, LevelControl, drive_control
 from .history import History
 from .model import Model, StepOptions, StepResult
 from .newton import Strategy
-from .path import PRECISION, ROUGH, SURE, EquilibriumPath, Point
+from .path import ROUGH, SURE, EquilibriumPath
+from .path_point import PRECISION, Point
 from .relaxation import over_unstable_growth
 from .state import State, Trace
 from .step import not_given_up

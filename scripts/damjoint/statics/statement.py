@@ -9,7 +9,7 @@ from ..input.case import Case
 from ..input.constraints import STAGED
 from ..input.values import has_drains, level_unknown
 from ..model.results import Results
-from ..solver.path import FALL, PRECISION
+from ..solver.path_point import FALL, PRECISION
 from ..units import FORCES, STRESSES, with_unit
 from . import gravity
 from .verdict import STIFF_JOINT, Bound, bound, failure, slipped_from, stiffness_ratio, verdict

@@ -24,7 +24,8 @@ from ..input.resolve import resolve, varied
 from ..joint.interface import interface_of
 from ..model.results import Results, row_of_joint
 from ..session import study_end
-from ..solver.path import PRECISION, RISE, ROUGH, SURE, Point
+from ..solver.path import RISE, ROUGH, SURE
+from ..solver.path_point import PRECISION, Point
 from ..statics.statement import REASONS, words_of_bound
 from ..statics.verdict import bound, highest_by_statics
 from ..threads import limited_threads

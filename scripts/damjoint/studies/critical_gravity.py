@@ -12,7 +12,7 @@ from .. import InputError
 from ..input.case import Case
 from ..joint.interface import interface_of
 from ..model.results import column_of
-from ..solver.path import PRECISION, Point
+from ..solver.path_point import PRECISION, Point
 from ..statics import gravity
 from ..statics.limit import elastic_heel_stress
 from ..statics.statement import cracks_and_drains

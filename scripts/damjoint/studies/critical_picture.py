@@ -31,7 +31,7 @@ from ..pictures.drawing import (
 from ..pictures.drawing import figure_of as drawing_of
 from ..pictures.run_picture import draw_dam
 from ..pictures.scene import loads_label, state_label
-from ..solver.path import Point
+from ..solver.path_point import Point
 from ..units import LENGTHS, unit
 from .critical_value import CriticalValue
 from .failure_path import FailurePath, Trial

@@ -23,7 +23,7 @@ from ..post.field_files import write_fields
 from ..post.tables import write_csv
 from ..runner import early_end
 from ..session import Session, preparation, session, study_end
-from ..solver.path import PRECISION, Point
+from ..solver.path_point import PRECISION, Point
 from ..statics.hints import tension_share
 from ..statics.statement import statement
 from . import critical_picture as picture

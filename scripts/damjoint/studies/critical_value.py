@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from ..solver.path import Point
+from ..solver.path_point import Point
 
 #: Relative difference up to which the levels agree that are reached after unstable crack growth.
 AFTER_GROWTH = 1e-3

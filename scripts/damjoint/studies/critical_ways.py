@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from ..input.case import Case
-from ..solver.path import FALL
+from ..solver.path_point import FALL
 from .critical_value import CriticalValue
 from .failure_path import LOWER_BEGIN, FailurePath
 

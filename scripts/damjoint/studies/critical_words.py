@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ..model.results import column_of
-from ..solver.path import STRENGTH_LOST, Point
+from ..solver.path import STRENGTH_LOST
+from ..solver.path_point import Point
 from .failure_path import FailurePath
 
 

@@ -26,19 +26,14 @@ from ..solver.history import History, JointState
 from ..solver.load_stepper import SAME_TIME, LoadStepper
 from ..solver.path import (
     BY_LEVEL,
-    FALL,
     LEVEL_RISE,
     MOST_REFINED,
     NEAR_HIGHEST,
-    PRECISION,
     RISE,
     SURE,
     EquilibriumPath,
-    Point,
-    Solved,
-    filled_part,
-    solve_once,
 )
+from ..solver.path_point import FALL, PRECISION, Point, Solved, filled_part, solve_once
 from .critical_value import AFTER_GROWTH
 
 #: Columns of critical.csv: a row per equilibrium of each dam that was tried. With several joints:

@@ -26,7 +26,7 @@ from ..input.parameters import of_any_joint
 from ..input.resolve import varied
 from ..joint.interface import interface_of
 from ..processes import process_count
-from ..solver.path import PRECISION
+from ..solver.path_point import PRECISION
 from ..threads import limited_threads
 from . import keys, sampling
 from .critical import Search

@@ -29,7 +29,7 @@ from ..solver.derivatives import (
     history_row,
 )
 from ..solver.load_stepper import SAME_TIME, LoadStepper
-from ..solver.path import Point
+from ..solver.path_point import Point
 from ..solver.sides import SidesInStep
 from ..statics.gravity import factors_of_state, with_crack
 from ..threads import limited_threads
