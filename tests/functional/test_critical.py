@@ -32,7 +32,7 @@ from damjoint.studies import failure_path
 from damjoint.studies.critical import QUICK, Search, finished
 from damjoint.studies.critical_study import critical, printed_lines, table
 from damjoint.studies.critical_value import CriticalValue
-from damjoint.studies.critical_ways import SHORTER, Way, falls_by_water
+from damjoint.studies.critical_ways import SHORTER, Way, falls_by_water, ways_to_confirm
 from damjoint.studies.critical_words import by_increments
 from damjoint.studies.failure_path import FailurePath, brittle_in_shear
 from variants import further
@@ -403,6 +403,34 @@ def test_many_points_that_soften_by_a_little_are_growth(first):
     _, answer = search_result("dam", settings=section | joint | concrete, levels=f"{first}")
     assert answer.confirmed and answer.mode == "unstable crack growth"
     assert answer.growth == answer.value == pytest.approx(54.919, rel=path.PRECISION / 2)
+
+
+@pytest.mark.heavy
+def test_how_far_the_level_falls_is_measured_from_the_highest_level_before():
+    """It falls by 0.11 % from 73.310 m and rises again: from the points of the increments, 73.283 m
+    and 73.230 m, that was less than 0.1 %, and 75.343 m was confirmed.
+    """
+    section = {"dam_height": 75.5, "dam_base": 47.94, "dam_crest": 6.855, "n_joint": 40}
+    joint = {"K_N": 1.74e11, "K_T": 1.314e11, "mu": 1.14, "adhesion": 209e3, "sigma_max": 94.4e3}
+    joint |= {"law": "rupture", "pena_rupture": 3.49, "alpha": 1.5, "uplift": "none"}
+    concrete = {"E": 2.41e10, "E_found": 1.142e10, "nu": 0.244}
+    _, answer = search_result("dam", settings=section | joint | concrete, levels="33.98")
+    assert answer.confirmed and answer.mode == "unstable crack growth"
+    assert answer.value == pytest.approx(73.310, rel=path.PRECISION)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("first", [7.77, 12.95])
+def test_the_slip_is_prescribed_where_all_other_displacements_move_back(first):
+    """As points that were pressed open beside the toe the joint slips, and closes at the heel: no
+    increment of crest, joint or process zone leads on from 45.893 m, and a long one to 46.026 m.
+    """
+    section = {"dam_height": 25.9, "dam_base": 23.7, "dam_crest": 3.508, "n_joint": 40}
+    joint = {"K_N": 2.84e11, "K_T": 1.301e11, "mu": 1.15, "adhesion": 684e3, "sigma_max": 79e3}
+    joint |= {"law": "bond", "G_f": 197, "G_t": 1150, "uplift": "drained", "drain_x": 2.37}
+    concrete = {"E": 1.04e10, "E_found": 1.633e10, "nu": 0.227}
+    _, answer = search_result("dam", settings=section | joint | concrete, levels=f"{first}")
+    assert answer.confirmed and answer.value == pytest.approx(46.025, rel=path.PRECISION)
 
 
 @pytest.mark.heavy
@@ -1185,6 +1213,21 @@ def test_a_joint_that_loses_its_cohesion_is_repeated_to_half_of_the_precision(mo
         assert whole.loses_cohesion == (not sigma_max)
         search.repeated(whole)
         assert found == {"way": SHORTER, "precision": part * PRECISION}
+
+
+def test_a_joint_without_tensile_strength_loses_its_cohesion_point_by_point():
+    """Which points are left depends on all increments: a level of such a joint is compared with
+    that from a lower first level, too. From one first level 159.45 m was confirmed, 159.49 m from
+    another.
+    """
+    for sigma_max in (0, 1e5):
+        settings = {"law": "bond", "adhesion": 2.5e5, "sigma_max": sigma_max, "n_joint": 10}
+        search = Search(load("dam", settings, "10"), "level")
+        path = FailurePath(search.base, interface_of(search.base))
+        assert path.loses_cohesion == (not sigma_max)
+        result = CriticalValue(45.0, "sliding", "the whole joint slips", "", path.points[-1])
+        ways = ways_to_confirm(path, path, result, grows=False, mechanism=True)
+        assert [way.levels for _, way in ways] == [(6.0, 10.0)] * (not sigma_max)
 
 
 #: A stiff, brittle mixed joint that the weight alone breaks (static loads of random quake 152-10).

@@ -258,6 +258,24 @@ def process_zone(equilibrium: Equilibrium, state: State) -> Array | None:
     return interface.at_points.T @ direction[:, : interface.dim].ravel()
 
 
+def mean_slip(equilibrium: Equilibrium, state: State) -> Array | None:
+    """The mean jump of all points along the slip of each in the step to a state, from the unknowns
+    (j,); None if none has slipped.
+    """
+    if state.previous is None:
+        return None
+    interface = equilibrium.interface
+    direction = interface.jumps(interface.at_points, state.jump - state.previous.jump)
+    direction[:, 0] = 0
+    size = np.linalg.norm(direction, axis=1)
+    if not size.any():
+        return None
+    direction *= (interface.weights / np.where(size > 0, size, 1) / interface.weights.sum())[
+        :, None
+    ]
+    return interface.at_points.T @ direction[:, : interface.dim].ravel()
+
+
 def crack_tip(equilibrium: Equilibrium, state: State) -> tuple[Array, float] | None:
     """The opening, from the unknowns (j,), of the point that opens next, and how far it is from its
     next stage [m], see `Law.stages`: of the points that are not broken, or that release their

@@ -13,7 +13,7 @@ displacement, is a mechanism.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from copy import copy
 from dataclasses import replace
 from itertools import takewhile
@@ -33,7 +33,7 @@ from .controls import (
     LevelControl,
     crack_tip,
 )
-from .path_point import FALL, PRECISION, STRAIGHT, Point, Solved, solve_once
+from .path_point import FALL, PRECISION, SLIP, STRAIGHT, Point, Solved, solve_once
 from .relaxation import over_unstable_growth
 
 P = TypeVar("P", bound="EquilibriumPath")
@@ -65,6 +65,9 @@ SHORT = 1e-3
 SHORTENED = 1 / 16
 #: It is given up when it is shorter than this, over the first trial [-]: the branch ends there.
 SMALLEST = 1e-6
+#: Parts of its length at which the slip is prescribed at last [-]: a long one may lead to another
+#: branch.
+SLIP_PARTS = SHORTENED**3, SHORTENED**4
 #: The same over the displacement so far [-].
 LEAST = 1e-8
 
@@ -331,23 +334,14 @@ class EquilibriumPath:
     def advance_branch(self) -> bool:
         """Append the next equilibria of the branch; whether there are any. Below its highest level,
         or where increments stay short, none are sought; where a joint slips whole, no short ones.
+        To the first unstable growth the slip is prescribed where no other displacement leads on.
         """
         last, part = self.points[-1], 1.0
         if last.level < (1 - self.unstable_fall) * self.highest or self.crawled > MOST_SHORT:
             return False
-        while part > (SHORTENED if last.slipping is not None else SMALLEST):
-            for kind, control in last.controls.items():
-                by = part * self.increment(control)
-                if abs(by) < max(LEAST * self.imposed(last), self.negligible(last, control)):
-                    continue
-                smallest = SHRINKING if last.opens_points and part == 1 else SHORTENED
-                new, error = self.along(last, control, by, smallest * abs(by), kind)
-                if new:
-                    reached = new[-1].imposed - self.imposed(last)
-                    self.append(new, error=error, shortened=reached < 0.9 * abs(by) or part < 1)
-                    short = reached < CRAWL * self.imposed(last)
-                    self.crawled = self.crawled + 1 if short else 0
-                    return True
+        while part > (least := SHORTENED if last.slipping is not None else SMALLEST):
+            if self.advance_by(last, last.controls, part):
+                return True
             if last.opens_points and part == 1:
                 new = self.by_tip(last) or self.by_level_rise(last)
                 if new:
@@ -355,6 +349,30 @@ class EquilibriumPath:
                     self.crawled = 0
                     return True
             part *= SHORTENED
+        if not self.to_growth or last.control == SLIP:
+            return False
+        parts = (part for part in SLIP_PARTS if part > least)
+        return any(self.advance_by(last, last.slip_control, part) for part in parts)
+
+    def advance_by(
+        self, last: Point, controls: Mapping[str, DisplacementControl], part: float
+    ) -> bool:
+        """Append the next equilibria of the branch by a part of the next increment of one of these
+        controls; whether there are any.
+        """
+        for kind, control in controls.items():
+            by = part * self.increment(control)
+            negligible = 0.0 if kind == SLIP else self.negligible(last, control)
+            if abs(by) < max(LEAST * self.imposed(last), negligible):
+                continue
+            smallest = SHRINKING if last.opens_points and part == 1 else SHORTENED
+            new, error = self.along(last, control, by, smallest * abs(by), kind)
+            if new:
+                reached = new[-1].imposed - self.imposed(last)
+                self.append(new, error=error, shortened=reached < 0.9 * abs(by) or part < 1)
+                short = reached < CRAWL * self.imposed(last)
+                self.crawled = self.crawled + 1 if short else 0
+                return True
         return False
 
     def by_tip(self, last: Point) -> list[Point]:

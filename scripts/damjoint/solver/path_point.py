@@ -14,13 +14,23 @@ from .. import ROUND_OFF
 from ..arrays import Array, BoolArray
 from ..joint.interface import JointInterface
 from ..laws.base import Law
-from .controls import BodyControl, Control, DirectionControl, DisplacementControl, process_zone
+from .controls import (
+    BodyControl,
+    Control,
+    DirectionControl,
+    DisplacementControl,
+    mean_slip,
+    process_zone,
+)
 from .history import History
 from .model import Model, StepResult
 from .state import State
 
 #: Relative precision of a critical value [-].
 PRECISION = 1e-4
+
+#: What is prescribed where all other displacements move back, see `Point.slip_control`.
+SLIP = "slip"
 
 # Two steps from the same equilibrium lead to the same state
 
@@ -76,7 +86,7 @@ class Point:
     #: the displacement imposed so far, with that before the first increment [m]; 0 where the level
     #: is prescribed
     imposed: float = 0.0
-    #: what was prescribed: level, crest, zone or heel
+    #: what was prescribed: level, crest, arc, zone, slip or heel
     control: str = "level"
 
     @cached_property
@@ -179,8 +189,8 @@ class Point:
     @property
     def controls(self) -> dict[str, DisplacementControl]:
         """What can be prescribed to continue: the crest, unless it has moved back, which it does if
-        the dam is unloaded, too; the movement of the joints along the last one (arc); and the
-        mean jump of the points whose damage has grown (zone). First what has led to here.
+        the dam is unloaded, too; the movement of the joints along the last one (arc); the mean jump
+        of the points whose damage has grown (zone). First what has led to here.
         """
         crests = self.history.rows["crest_ux"][-2:]
         controls: dict[str, DisplacementControl] = {}
@@ -191,7 +201,17 @@ class Point:
         zone = process_zone(self.model.equilibrium, self.state)
         if zone is not None:
             controls["zone"] = DirectionControl(0.0, zone)
+        if self.control == SLIP:
+            controls |= self.slip_control
         return dict(sorted(controls.items(), key=lambda item: item[0] != self.control))
+
+    @property
+    def slip_control(self) -> dict[str, DisplacementControl]:
+        """The mean slip, which still grows where all `controls` move back, as points that were
+        pressed open beside the toe; empty if nothing slips.
+        """
+        slip = mean_slip(self.model.equilibrium, self.state)
+        return {} if slip is None else {SLIP: DirectionControl(0.0, slip)}
 
     def moved(self, control: DisplacementControl) -> float:
         """What a control measures of the last movement [m]."""

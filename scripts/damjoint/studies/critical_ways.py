@@ -63,6 +63,9 @@ def ways_to_confirm(
             ways += ((path, way) for way in further)
         if first.weighed_with_water:
             ways.append((path, lower_begin(path.case)))
+    if first.loses_cohesion and not (first.coarse or first.weighed_with_water):
+        # which points are left depends on all increments
+        ways.append((path, lower_begin(path.case)))
     # which points the water reaches, and which ones close again, depends on the increments
     if path.water_withdraws or (path.ran_on and not path.slides):
         ways += (path, lower_begin(path.case)), (path, LONGER)

@@ -151,14 +151,15 @@ class FailurePath(EquilibriumPath):
         #: whether a law softens, in tension or in shear
         self.softens = any(law.softens for law in laws.laws)
         brittle = any(law.softens and law.tensile_strength > 0 for law in laws.laws)
-        coarse = brittle_in_shear(case)
+        #: whether elements do not resolve the softening in shear of a joint
+        self.coarse = brittle_in_shear(case)
         #: whether a joint slips point by point before it slips whole, each of which loses its
         #: cohesion: the increments all the way decide which points are left
-        self.loses_cohesion = coarse or any(
+        self.loses_cohesion = self.coarse or any(
             law.softens and not law.tensile_strength and 0 < law.intact_cohesion < np.inf
             for law in laws.laws
         )
-        self.predicts = not coarse
+        self.predicts = not self.coarse
         self.releases_shear = laws.releases_shear
         self.to_growth = to_growth and (self.releases_shear or (brittle and not self.entering))
         # after a step of the weight alone steps can be halved; else the first includes the weight
@@ -371,7 +372,8 @@ class FailurePath(EquilibriumPath):
             if self.leads_out and self.points[self.top] is not self.dry_beyond:
                 self.fill_on()
             if self.to_growth and self.top + 1 < len(self.points):
-                self.refine(self.points[-1].level / (1 - self.unstable_fall))  # how far it falls
+                lowest = min(point.level for point in self.points[self.top :])
+                self.refine(lowest / (1 - self.unstable_fall))  # how far it falls
                 self.refine_fall()
         if not self.reached:
             self.refine(self.target)
