@@ -420,6 +420,21 @@ def test_how_far_the_level_falls_is_measured_from_the_highest_level_before():
 
 
 @pytest.mark.heavy
+def test_a_fall_of_nearly_as_much_as_unstable_growth_before_the_highest_level():
+    """It falls by 0.099 % from 30.772 m: 30.856 m was confirmed from one first level, 30.773 m from
+    another.
+    """
+    section = {"dam_height": 27, "dam_base": 17.06, "dam_crest": 1.503, "n_joint": 20}
+    joint = {"K_N": 1.29e11, "K_T": 7.792e10, "mu": 0.723, "adhesion": 476.2e3, "sigma_max": 563e3}
+    joint |= {"law": "endo", "G_f": 80.01, "uplift": "drained", "drain_x": 1.706}
+    concrete = {"E": 2.9e10, "E_found": 3.973e10, "nu": 0.224}
+    search, answer = search_result("dam", settings=section | joint | concrete, levels="8.1")
+    assert search.trials[-1].path.nearly_grows and not answer.confirmed
+    low, high = (float(number) for number in re.findall(r"\d+\.\d+", answer.doubt)[:2])
+    assert low == pytest.approx(30.772, rel=1e-4) and high == pytest.approx(30.856, rel=1e-4)
+
+
+@pytest.mark.heavy
 @pytest.mark.parametrize("first", [7.77, 12.95])
 def test_the_slip_is_prescribed_where_all_other_displacements_move_back(first):
     """As points that were pressed open beside the toe the joint slips, and closes at the heel: no

@@ -65,11 +65,11 @@ SHORT = 1e-3
 SHORTENED = 1 / 16
 #: It is given up when it is shorter than this, over the first trial [-]: the branch ends there.
 SMALLEST = 1e-6
+#: The same over the displacement so far [-].
+LEAST = 1e-8
 #: Parts of its length at which the slip is prescribed at last [-]: a long one may lead to another
 #: branch.
 SLIP_PARTS = SHORTENED**3, SHORTENED**4
-#: The same over the displacement so far [-].
-LEAST = 1e-8
 
 # Where points are opened one by one, and no other displacement leads on
 

@@ -55,7 +55,8 @@ def ways_to_confirm(
     repeated, ways = repeats_whole(first), list[tuple[FailurePath, Way]]()
     grows_unstably, enters = bool(result.why) and result.leads_higher, path.entering
     # the growth of a single point may be passed over
-    if (grows_unstably and not enters) or (grows and first.releases_shear):
+    over = (grows_unstably and not enters) or (grows and first.releases_shear)
+    if over or first.nearly_grows:
         ways += ((first, way) for way in over_growth(first, repeated))
     if (result.why or path.water_withdraws) and not result.leads_higher:
         if result.growth is None:
@@ -73,6 +74,8 @@ def ways_to_confirm(
         ways.append((path, replace(lower_begin(path.case), share=SHORTER.share)))
         if path.passed_growth is not None:  # to which branch depends on them, too
             ways.append((path, LONGER))
+    elif enters and path.softens and mechanism:
+        ways.append((path, lower_begin(path.case)))
     return list(dict.fromkeys(ways))
 
 

@@ -76,6 +76,9 @@ ABOVE = AFTER_GROWTH
 #: Precision to which it is sought how far the level falls, over the fall that is unstable.
 EXACT = 0.02
 
+#: Part of that fall from which on other increments may find all of it.
+NEARLY = 0.9
+
 #: Time of an increment of displacement, after the last level, where all loads act in full.
 TICK = 1e-3
 
@@ -578,6 +581,16 @@ class FailurePath(EquilibriumPath):
         """
         count = self.top + 1 if self.slides else len(self.points)
         return any(n < count for n in self.jumps) or self.growth_until(count) is not None
+
+    @property
+    def nearly_grows(self) -> bool:
+        """Whether the level has fallen, before its highest one, by nearly as much as is unstable
+        growth: other increments may find that it has.
+        """
+        levels = self.levels[: self.top + 1]
+        levels = levels[np.isfinite(levels)]
+        fallen = 1 - levels / np.maximum.accumulate(levels)
+        return self.to_growth and bool(fallen.max(initial=0.0) > NEARLY * self.unstable_fall)
 
     @property
     def jumps(self) -> list[int]:
