@@ -250,29 +250,30 @@ def process_zone(equilibrium: Equilibrium, state: State) -> Array | None:
     )
     opened = np.array([True, False, False]) == (jumps[1][:, :1] > 0)
     direction = (jumps[1] - jumps[0]) * opened
-    size = np.linalg.norm(direction, axis=1)
-    weights = interface.weights * np.maximum(after - before, 0) * (size > 0)
-    if not weights.any():
-        return None
-    direction *= (weights / np.where(size > 0, size, 1) / weights.sum())[:, None]
-    return interface.at_points.T @ direction[:, : interface.dim].ravel()
+    return mean_along(interface, direction, interface.weights * np.maximum(after - before, 0))
 
 
 def mean_slip(equilibrium: Equilibrium, state: State) -> Array | None:
-    """The mean jump of all points along the slip of each in the step to a state, from the unknowns
-    (j,); None if none has slipped.
+    """The mean slip of the points that have slipped in the step to a state, each in the direction
+    of that step, from the unknowns (j,); None if none has.
     """
     if state.previous is None:
         return None
     interface = equilibrium.interface
     direction = interface.jumps(interface.at_points, state.jump - state.previous.jump)
     direction[:, 0] = 0
+    return mean_along(interface, direction, interface.weights)
+
+
+def mean_along(interface: Interface, direction: Array, weights: Array) -> Array | None:
+    """The mean jump of points along the direction (q, 3) of each, from the unknowns (j,): of those
+    that have one, with weights (q,); None if none counts.
+    """
     size = np.linalg.norm(direction, axis=1)
-    if not size.any():
+    weights = weights * (size > 0)
+    if not weights.any():
         return None
-    direction *= (interface.weights / np.where(size > 0, size, 1) / interface.weights.sum())[
-        :, None
-    ]
+    direction = direction * (weights / np.where(size > 0, size, 1) / weights.sum())[:, None]
     return interface.at_points.T @ direction[:, : interface.dim].ravel()
 
 

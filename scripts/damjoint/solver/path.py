@@ -559,15 +559,17 @@ class EquilibriumPath:
         """Whether one step and two halves lead to the same state; up to unstable growth, also
         whether no tension is lost, and no water enters, at once in one of the halves.
         """
-        if self.to_growth and (self.leaps(begin, middle) or self.leaps(middle, end)):
-            return False
-        if self.to_growth:
-            bend = np.abs(middle.uplifts - (begin.uplifts + end.uplifts) / 2).max(initial=0)
-            enters = bend > FALL * middle.thrust and not end.reaches_joint(begin)
-            halves = middle.tension_lost(begin), end.tension_lost(middle)
-            if enters or abs(halves[1] - halves[0]) / 2 > FALL * middle.thrust:
-                return False
-        return not whole.differs(end, begin)
+        grows = self.to_growth and self.grows_at_once(begin, middle, end)
+        return not (grows or whole.differs(end, begin))
+
+    def grows_at_once(self, begin: Point, middle: Point, end: Point) -> bool:
+        """Whether tension is lost, or water enters, at once in one half of an increment."""
+        if self.leaps(begin, middle) or self.leaps(middle, end):
+            return True
+        bend = np.abs(middle.uplifts - (begin.uplifts + end.uplifts) / 2).max(initial=0)
+        enters = bend > FALL * middle.thrust and not end.reaches_joint(begin)
+        lost = end.tension_lost(middle) - middle.tension_lost(begin)
+        return bool(enters or abs(lost) / 2 > FALL * middle.thrust)
 
     def leaps(self, begin: Point, end: Point) -> bool:
         """Whether tension is lost at once in an increment, see `Point.leaps`; where points are
@@ -656,13 +658,13 @@ class EquilibriumPath:
         again.refine()
         return again
 
-    def growth_until(self, number: int) -> float | None:
+    def growth_until(self, number: int, part: float = 1.0) -> float | None:
         """The level [m] of the first limit point among so many points, after which the level falls
-        unstably; None if there is none.
+        unstably, or by a part of such a fall; None if there is none.
         """
         levels = self.levels[:number]
         highest = np.maximum.accumulate(levels)
-        falls = np.flatnonzero(levels < (1 - self.unstable_fall) * highest)
+        falls = np.flatnonzero(levels < (1 - part * self.unstable_fall) * highest)
         return float(highest[falls[0]]) if len(falls) else None
 
     def cut_after(self, number: int) -> None:

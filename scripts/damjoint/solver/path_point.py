@@ -256,12 +256,17 @@ class Point:
         return np.concatenate([laws.damage(jumps, variables), *slips])
 
     @cached_property
+    def last_growth(self) -> Array:
+        """The change of `irreversible` in the last step (2 q,); zero in the first one."""
+        now = self.irreversible(self.state)
+        return now - (self.irreversible(self.state.previous) if self.state.previous else now)
+
+    @cached_property
     def dissipation(self) -> float:
         """How much damage and slip have grown in the last step, over the movement."""
-        before = self.state.previous
-        if before is None or not self.movement.any():
+        if not self.movement.any():
             return 0.0
-        growth = self.irreversible(self.state) - self.irreversible(before)
+        growth = self.last_growth
         growth = np.maximum(growth, 0) if self.opens_points else np.abs(growth)
         return float(growth.sum() / np.abs(self.movement).max())
 
@@ -361,11 +366,8 @@ class Point:
     @cached_property
     def tension_lost_last(self) -> float:
         """The tensile strength [N] that points have lost in the last step."""
-        before = self.state.previous
-        if before is None:
-            return 0.0
-        growth = np.maximum(self.damage - np.split(self.irreversible(before), 2)[0], 0)
-        return self.strength_of(growth, self.tensile_strengths)
+        damage, _ = np.split(self.last_growth, 2)
+        return self.strength_of(np.maximum(damage, 0), self.tensile_strengths)
 
     @property
     def thrust(self) -> float:
@@ -401,7 +403,7 @@ class Point:
         ]
         return np.concatenate(filled)
 
-    @property
+    @cached_property
     def heads(self) -> Array:
         """The uplift of each joint, full of the reservoir's water, beyond that of the tailwater
         alone [N].

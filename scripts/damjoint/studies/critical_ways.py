@@ -54,6 +54,7 @@ def ways_to_confirm(
     """
     repeated, ways = repeats_whole(first), list[tuple[FailurePath, Way]]()
     grows_unstably, enters = bool(result.why) and result.leads_higher, path.entering
+    lower = path, lower_begin(path.case)
     # the growth of a single point may be passed over
     over = (grows_unstably and not enters) or (grows and first.releases_shear)
     if over or first.nearly_grows:
@@ -63,19 +64,19 @@ def ways_to_confirm(
             further = at_end(path, repeated and path is first, mechanism)
             ways += ((path, way) for way in further)
         if first.weighed_with_water:
-            ways.append((path, lower_begin(path.case)))
+            ways.append(lower)
     if first.loses_cohesion and not (first.coarse or first.weighed_with_water):
         # which points are left depends on all increments
-        ways.append((path, lower_begin(path.case)))
+        ways.append(lower)
     # which points the water reaches, and which ones close again, depends on the increments
     if path.water_withdraws or (path.ran_on and not path.slides):
-        ways += (path, lower_begin(path.case)), (path, LONGER)
+        ways += lower, (path, LONGER)
     elif grows_unstably and enters and not first.to_growth:  # long ones may pass it over
-        ways.append((path, replace(lower_begin(path.case), share=SHORTER.share)))
+        ways.append((path, replace(lower[1], share=SHORTER.share)))
         if path.passed_growth is not None:  # to which branch depends on them, too
             ways.append((path, LONGER))
     elif enters and path.softens and mechanism:
-        ways.append((path, lower_begin(path.case)))
+        ways.append(lower)
     return list(dict.fromkeys(ways))
 
 

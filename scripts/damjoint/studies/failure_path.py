@@ -375,8 +375,7 @@ class FailurePath(EquilibriumPath):
             if self.leads_out and self.points[self.top] is not self.dry_beyond:
                 self.fill_on()
             if self.to_growth and self.top + 1 < len(self.points):
-                lowest = min(point.level for point in self.points[self.top :])
-                self.refine(lowest / (1 - self.unstable_fall))  # how far it falls
+                self.refine(self.lowest_beyond / (1 - self.unstable_fall))  # how far it falls
                 self.refine_fall()
         if not self.reached:
             self.refine(self.target)
@@ -583,14 +582,16 @@ class FailurePath(EquilibriumPath):
         return any(n < count for n in self.jumps) or self.growth_until(count) is not None
 
     @property
+    def lowest_beyond(self) -> float:
+        """The lowest level from its highest one on [m]."""
+        return min(point.level for point in self.points[self.top :])
+
+    @property
     def nearly_grows(self) -> bool:
         """Whether the level has fallen, before its highest one, by nearly as much as is unstable
         growth: other increments may find that it has.
         """
-        levels = self.levels[: self.top + 1]
-        levels = levels[np.isfinite(levels)]
-        fallen = 1 - levels / np.maximum.accumulate(levels)
-        return self.to_growth and bool(fallen.max(initial=0.0) > NEARLY * self.unstable_fall)
+        return self.to_growth and self.growth_until(self.top + 1, NEARLY) is not None
 
     @property
     def jumps(self) -> list[int]:
