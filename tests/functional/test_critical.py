@@ -421,17 +421,22 @@ def test_how_far_the_level_falls_is_measured_from_the_highest_level_before():
 
 @pytest.mark.heavy
 def test_a_fall_of_nearly_as_much_as_unstable_growth_before_the_highest_level():
-    """It falls by 0.099 % from 30.772 m: 30.856 m was confirmed from one first level, 30.773 m from
-    another.
+    """It falls by 0.099 to 0.101 % from 30.773 m, depending on the increments: 30.856 m was
+    confirmed from one first level, 30.773 m from another.
     """
     section = {"dam_height": 27, "dam_base": 17.06, "dam_crest": 1.503, "n_joint": 20}
     joint = {"K_N": 1.29e11, "K_T": 7.792e10, "mu": 0.723, "adhesion": 476.2e3, "sigma_max": 563e3}
     joint |= {"law": "endo", "G_f": 80.01, "uplift": "drained", "drain_x": 1.706}
     concrete = {"E": 2.9e10, "E_found": 3.973e10, "nu": 0.224}
-    search, answer = search_result("dam", settings=section | joint | concrete, levels="8.1")
-    assert search.trials[-1].path.nearly_grows and not answer.confirmed
-    low, high = (float(number) for number in re.findall(r"\d+\.\d+", answer.doubt)[:2])
-    assert low == pytest.approx(30.772, rel=1e-4) and high == pytest.approx(30.856, rel=1e-4)
+    search = Search(load("dam", section | joint | concrete, "8.1", "0"), "level")
+    first = search.path(8.1, search.base, 53.0, to_growth=True)
+    passed = FailurePath(search.base, first.interface, 53.0, to_growth=True, known=first)
+    passed.unstable_fall = 1.05e-3
+    passed, grows = finished(passed)
+    assert passed.nearly_grows and passed.highest == pytest.approx(30.856, rel=path.PRECISION)
+    result = CriticalValue(passed.highest, "", "the crack grows unstably", "", passed.points[-1])
+    ways = [way for _, way in ways_to_confirm(passed, passed, result, grows, mechanism=False)]
+    assert len({way.unstable_fall for way in ways}) == 3
 
 
 @pytest.mark.heavy
@@ -483,8 +488,9 @@ def test_a_joint_that_slips_whole_holds_more_as_water_leaves_it():
 @pytest.mark.parametrize("first", [16.989, 28.3])
 def test_a_path_is_continued_from_a_run_where_water_enters(first):
     """Each element that the water enters turns the path, which ended at 80.11 m, while runs stand
-    above, with as much uplift: no level was confirmed. The whole joint slips at 84.03 m. Some runs
-    stop at 80.11 m, which was confirmed; from a lower first level, by long steps, they do not.
+    above, with as much uplift: no level was confirmed. The whole joint slips at 83.69 m or, with
+    less uplift, 84.03 m. Some runs stop at 80.11 m, which was confirmed; from a lower first level,
+    by long steps, they do not.
     """
     section = {"dam_height": 56.63, "dam_base": 52.15, "dam_crest": 7.059, "n_joint": 20}
     joint = {"K_N": 6.984e11, "K_T": 4.486e11, "adhesion": 437.9e3, "sigma_max": 593.7e3}
@@ -494,7 +500,7 @@ def test_a_path_is_continued_from_a_run_where_water_enters(first):
     path, _ = finished(search.path(first, search.base, 100.0, to_growth=True))
     begin = next(point for point in path.points if len(point.model.case.levels) > 1)
     assert begin.level < 80.2 and path.has_full_uplift(path.points[path.top].history)[-1]
-    assert path.ran_on and path.slides and path.highest == pytest.approx(84.0267, rel=1e-4)
+    assert path.ran_on and path.slides and 83.68 < path.highest < 84.03
 
 
 def test_uplift_is_full_where_the_water_reaches_as_far_in_all_joints_as_before_it_withdraws():
@@ -510,12 +516,117 @@ def test_uplift_is_full_where_the_water_reaches_as_far_in_all_joints_as_before_i
     joints = [SimpleNamespace(points=point, width=2.0) for point in points]
     equilibrium = SimpleNamespace(interface=SimpleNamespace(joints=joints), unit_weight=10.0)
     path = SimpleNamespace(stepper=SimpleNamespace(model=SimpleNamespace(equilibrium=equilibrium)))
-    path.admissible = [SimpleNamespace(filled=filled) for filled in ((0.2, 0.5), (0.3, 0.4))]
+    parts = (((0.2, 0.5), (0.1, 0.4)), ((0.3, 0.4), (0.2, 0.3)))
+    path.admissible = [SimpleNamespace(wet_parts=np.array(wet)) for wet in parts]
     rows = {"level": [5, 6, 7, 8], "tail_level": [2, 2, 2, 2]}  # 10 (level - tail) each if full
     rows["U"] = [(20 + 9) / 2, (20 + 12) / 2, (20 + 14.9) / 2, (20 + 18) / 2]
     rows["U_2"] = [(10 + 15) / 2, (10 + 20) / 2, (10 + 25) / 2, (10 + 29.9) / 2]
-    full = FailurePath.has_full_uplift(path, SimpleNamespace(rows=rows))
-    assert full.tolist() == [True, True, False, False]
+    cracks = {"full_head": [0.2, 0.1, 0.1, 0.1], "full_head_2": [0.3, 0.3, 0.3, 0.3]}
+    assert FailurePath.has_full_uplift(path, Rows(rows | cracks)).tolist() == [
+        True,
+        True,
+        False,
+        False,
+    ]
+    rows["U"][2] = 0  # the tailwater has entered the first joint, whose crack is as long
+    cracks["full_head"][2] = 0.2
+    full = FailurePath.has_full_uplift(path, Rows(rows | cracks))
+    assert full.tolist() == [True, True, True, False]
+
+
+class Rows(SimpleNamespace):
+    """A history of rows."""
+
+    def __init__(self, rows):
+        super().__init__(rows=rows)
+
+    def __len__(self):
+        return len(self.rows["level"])
+
+
+@pytest.mark.parametrize(
+    "wet, counted",
+    [
+        # the crack closes again after the third point
+        ([(0.5, 0.0), (0.8, 0.6), (0.8, 0.6), (0.7, 0.5), (0.6, 0.4)], 3),
+        # the tailwater enters the joint from its toe
+        ([(0.5, 0.0), (0.5, 0.0), (0.49, 0.0), (0.48, 0.0), (0.47, 0.0)], 5),
+        # more of the water's head is lost in the crack, which is longer
+        ([(0.5, 0.0), (0.8, 0.6), (0.82, 0.5), (0.84, 0.4), (0.86, 0.3)], 5),
+    ],
+)
+def test_levels_count_up_to_the_longest_crack_that_is_full_of_water(wet, counted):
+    """Uplift of a joint over that of a joint full of water, and its part under the full head. By
+    the uplift alone, less of it where the tailwater enters from the toe counted as water that
+    withdraws: dams of 49, 78 and 110 m had 21 to 27 m, 31 to 40 m and 47 to 63 m for 49.2, 81.7 and
+    112.8 m. Of points with as long a crack the first one counted: 48.9 for 49.1 m.
+    """
+    points = [
+        SimpleNamespace(level=50.0 + number, wet_parts=np.array(parts)[:, None])
+        for number, parts in enumerate(wet)
+    ]
+    path = SimpleNamespace(entering=True, points=points)
+    assert FailurePath.counted.fget(path) == counted
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("first", [33.0, 49.5])
+def test_a_growth_that_other_paths_pass_is_the_critical_level(first):
+    """A path of a wet crack ends at 112.79 m, or is led over the growth there by relaxation, to
+    115.35 m: no level was confirmed.
+    """
+    section = {"dam_height": 110, "dam_base": 78.65, "dam_crest": 15.18, "n_joint": 20}
+    joint = {"K_N": 1.48e11, "K_T": 8.776e10, "mu": 0.837, "adhesion": 614.8e3, "sigma_max": 607e3}
+    joint |= {"law": "endo", "G_f": 225.6, "uplift": "cracked"}
+    concrete = {"E": 1.04e10, "E_found": 4.233e9, "nu": 0.229}
+    _, answer = search_result("dam", settings=section | joint | concrete, levels=f"{first}")
+    assert answer.confirmed and answer.mode == "unstable crack growth"
+    assert answer.value == answer.growth == pytest.approx(112.793, rel=path.PRECISION / 2)
+    assert answer.stands_at == pytest.approx(115.351, rel=1e-3)
+
+
+@pytest.mark.heavy
+def test_no_level_is_the_highest_as_water_has_not_entered_the_points_opened_in_a_step():
+    """It enters in the next one, and the level falls: by 1 % from 73.643 m, or from 73.657 m by
+    shorter increments, while the first points break at 73.588 m.
+    """
+    section = {"dam_height": 68.9, "dam_base": 49.33, "dam_crest": 10.51, "n_joint": 40}
+    joint = {"K_N": 5.37e11, "K_T": 4.57e11, "mu": 0.914, "adhesion": 181e3, "sigma_max": 596e3}
+    joint |= {"law": "bond", "G_f": 168, "G_t": 125, "uplift": "cracked"}
+    concrete = {"E": 2.29e10, "E_found": 1.697e10, "nu": 0.195}
+    for first in ("20.67", "31.005"):
+        _, answer = search_result("dam", settings=section | joint | concrete, levels=first)
+        assert answer.confirmed and answer.value == pytest.approx(73.588, rel=path.PRECISION / 2)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("first", ["8.34", "12.51"])
+def test_a_higher_limit_point_beside_the_highest_one_is_not_passed_over(first):
+    """The level falls by 0.1 % from 35.7105 m and rises to 35.7177 m, between two points of which
+    the middle was in line to 3e-4: either one was the highest.
+    """
+    section = {"dam_height": 27.8, "dam_base": 25.1, "dam_crest": 2.61, "n_joint": 40}
+    joint = {"K_N": 7.32e10, "K_T": 3.719e10, "mu": 0.717, "adhesion": 668.1e3, "sigma_max": 832e3}
+    joint |= {"law": "endo", "G_f": 101.3, "uplift": "cracked"}
+    concrete = {"E": 1.13e10, "E_found": 2.43e10, "nu": 0.246}
+    search = Search(load("dam", section | joint | concrete, first, "0"), "level")
+    highest, _ = finished(search.path(float(first), search.base, 55.0, to_growth=True))
+    assert highest.highest == pytest.approx(35.717, rel=path.PRECISION / 2)
+
+
+@pytest.mark.heavy
+def test_another_control_leads_on_where_one_creeps_to_its_turning_point():
+    """The crest's increments became negligible just before 36.1886 m, where it turns; those of the
+    arc lead on, to 37.674 m. Either level was confirmed, from different first levels.
+    """
+    section = {"dam_height": 32.3, "dam_base": 26.81, "dam_crest": 4.424, "n_joint": 40}
+    joint = {"K_N": 5.5e10, "K_T": 3.866e10, "mu": 0.871, "adhesion": 177e3, "sigma_max": 274e3}
+    joint |= {"law": "rupture", "pena_rupture": 7.55, "alpha": 2}
+    joint |= {"uplift": "flow", "aperture_min": 9.93e-6}
+    concrete = {"E": 2.78e10, "E_found": 3.308e10, "nu": 0.23}
+    search = Search(load("dam", section | joint | concrete, "14.54", "0"), "level")
+    highest, grows = finished(search.path(14.54, search.base, 64.0, to_growth=True))
+    assert not grows and highest.highest == pytest.approx(37.6735, rel=path.PRECISION)
 
 
 #: A dam of 51 m whose branch splits at 80.744 m where the next point of the joint begins to slip:
@@ -760,9 +871,9 @@ def test_no_way_is_followed_twice_and_levels_with_less_uplift_do_not_count(monke
     }
     ways, follow = [], Search.from_beginning
 
-    def recorded(self, path, way, *precision):
+    def recorded(self, path, way):
         ways.append((path, way))
-        return follow(self, path, way, *precision)
+        return follow(self, path, way)
 
     monkeypatch.setattr(Search, "from_beginning", recorded)
     _, answer = search_result("dam", "level", settings, [2.285], "1.07")
@@ -1215,10 +1326,10 @@ def test_a_path_begins_as_a_run_where_single_steps_do_not_lead(monkeypatch):
     assert not answer.confirmed and "falls from the first equilibrium on, at 20 m" in answer.doubt
 
 
-def test_a_joint_that_loses_its_cohesion_is_repeated_to_half_of_the_precision(monkeypatch):
+def test_a_joint_that_loses_its_cohesion_is_known_to_half_of_the_precision(monkeypatch):
     """Four confirmed levels of one dam were 1.13e-4 apart, each the same as its repetition."""
     found = {}
-    again = lambda self, path, way, precision: found.update(way=way, precision=precision)
+    again = lambda self, path, way: found.update(way=way, precision=path.precision)
     monkeypatch.setattr(Search, "from_beginning", again)
     for sigma_max, part in ((0, 0.5), (1e5, 1.0)):
         settings = {"law": "bond", "adhesion": 2.5e5, "sigma_max": sigma_max, "n_joint": 10}

@@ -43,10 +43,17 @@ RECORDED_OF_JOINTS = (
     "heel",
 )
 
+#: Part of the reservoir's head that the water loses at most in a crack that it has entered [-].
+LOST_HEAD = 1e-3
+#: The part of a joint under the full head of the reservoir [-], recorded with cracked uplift.
+FULL_HEAD = "full_head"
+
 
 def recorded(case: Case) -> list[str]:
     """Names of what is recorded of the joints of a case."""
     of_joints = [*RECORDED_OF_JOINTS, *(n for n in history_columns(case) if n in IN_TIME)]
+    if any(joint["uplift"] == "cracked" for joint in case.joints):
+        of_joints.append(FULL_HEAD)
     return [column_of(name, k) for k in range(len(case.joints)) for name in of_joints]
 
 
@@ -147,8 +154,22 @@ class JointState:
             "M_U": M_U,
             "flux": self.pressure.leakage,
             "heel": joint.heel @ self.state.jump,
+            FULL_HEAD: self.full_head,
             **(self.in_time if self.state.stored else {}),
         }
+
+    @property
+    def full_head(self) -> float:
+        """The part in which the water has the full head of the reservoir [-]: the crack that it has
+        entered from there, not one that the tailwater enters; 0 but with cracked uplift.
+        """
+        water, weights = self.equilibrium.water[self.number], self.joint.points.weights
+        if water.case["uplift"] != "cracked":
+            return 0.0
+        reservoir = self.state.loading.level + water.case["joint_head_offset"]
+        depth = reservoir - self.joint.points.positions[:, 1]
+        full = self.pressure.points >= (1 - LOST_HEAD) * self.equilibrium.unit_weight * depth
+        return float(weights @ (full & (depth > 0)) / weights.sum())
 
     @property
     def in_time(self) -> dict[str, float]:

@@ -118,6 +118,9 @@ PLATEAU = 1e-7
 MOVES = 0.5
 #: Most increments that are inserted where a branch may be higher than its points.
 MOST_REFINED = 40
+#: How far a level may be above the points on both sides, over how far their lines meet above them,
+#: away from the highest level.
+CONVEX = 2
 #: The path is repeated from this relative distance below the highest level [-].
 REPEATED = 0.01
 #: By how many times shorter increments it is repeated.
@@ -363,10 +366,13 @@ class EquilibriumPath:
         for kind, control in controls.items():
             by = part * self.increment(control)
             negligible = 0.0 if kind == SLIP else self.negligible(last, control)
-            if abs(by) < max(LEAST * self.imposed(last), negligible):
+            least = max(LEAST * self.imposed(last), negligible)
+            if abs(by) < least and part < 1:
                 continue
-            smallest = SHRINKING if last.opens_points and part == 1 else SHORTENED
-            new, error = self.along(last, control, by, smallest * abs(by), kind)
+            smallest = abs(by) * (SHRINKING if last.opens_points and part == 1 else SHORTENED)
+            if abs(by) < least:  # one control creeps to where it turns, and another one leads on
+                by, smallest = float(np.copysign(least, by)), least / 2
+            new, error = self.along(last, control, by, smallest, kind)
             if new:
                 reached = new[-1].imposed - self.imposed(last)
                 self.append(new, error=error, shortened=reached < 0.9 * abs(by) or part < 1)
@@ -527,6 +533,9 @@ class EquilibriumPath:
             if whole is None:
                 by *= SHRINKING
                 continue
+            if self.overshoots(point, whole, control, kind):
+                whole, by = None, by / 2
+                continue
             equilibrium = point.model.equilibrium
             if not (self.verified and (equilibrium.path_dependent or equilibrium.flowing)):
                 return [whole], 0.0
@@ -545,6 +554,12 @@ class EquilibriumPath:
                     return [middle, end], 0.0
             whole, by = middle, by / 2 * (SHRINKING if middle is None else 1)
         return [], 0.0
+
+    def overshoots(self, begin: Point, end: Point, control: DisplacementControl, kind: str) -> bool:
+        """Whether an increment leads higher than any point before only as water has not entered the
+        points that it opens: at its end, the level with this water is lower.
+        """
+        return False
 
     def predictor_error(self, begin: Point, end: Point) -> float:
         """How far an increment is off the one before, over what is allowed if it is to need no
@@ -579,10 +594,15 @@ class EquilibriumPath:
         return end.leaps(begin) or (end.opens_points and end.opens_at_once(begin))
 
     def straight(self, begin: Point, middle: Point, end: Point) -> bool:
-        """Whether no limit point is between three equilibria: the levels are in line, or low."""
+        """Whether no limit point is between three equilibria: the levels are in line, or low; where
+        they fall beside the highest one, in line to the precision.
+        """
         bend = abs(middle.level - (begin.level + end.level) / 2)
-        highest = max(self.highest, middle.level, end.level)
-        return bend <= STRAIGHT * highest or middle.level < NEAR_HIGHEST * highest
+        levels = [point.level for point in (begin, middle, end)]
+        highest = max(self.highest, *levels)
+        beside = levels != sorted(levels) and max(levels) > (1 - STRAIGHT) * highest
+        least = PRECISION if beside else STRAIGHT
+        return bend <= least * highest or middle.level < NEAR_HIGHEST * highest
 
     def step(
         self, point: Point, control: DisplacementControl, by: float, kind: str
@@ -690,9 +710,18 @@ class EquilibriumPath:
         if point.is_last:
             return top, self.highest
         last = min(self.counted, len(self.points) - 1)
-        bounds = [(self.bound(first), first) for first in range(last)]
+        bounds = [(self.possible(first), first) for first in range(last)]
         possible, first = max(bounds, default=(self.highest, top))
         return first, max(possible, self.highest)
+
+    def possible(self, first: int) -> float:
+        """The level [m] that may be between a point and the next one: the bound, or, away from the
+        highest level, twice as far above both of them, as levels may rise faster than the lines
+        through the neighbours.
+        """
+        bound, ends = self.bound(first), max(p.level for p in self.points[first : first + 2])
+        near = first <= self.top <= first + 1
+        return bound if near else ends + CONVEX * (bound - ends)
 
     def bound(self, first: int, sign: int = 1) -> float:
         """An upper bound of the level [m] between a point and the next one; -inf where no point can

@@ -14,6 +14,7 @@ from .. import ROUND_OFF
 from ..arrays import Array, BoolArray
 from ..joint.interface import JointInterface
 from ..laws.base import Law
+from ..model.results import column_of
 from .controls import (
     BodyControl,
     Control,
@@ -22,7 +23,7 @@ from .controls import (
     mean_slip,
     process_zone,
 )
-from .history import History
+from .history import FULL_HEAD, History
 from .model import Model, StepResult
 from .state import State
 
@@ -402,6 +403,14 @@ class Point:
             for joint, uplift in parts
         ]
         return np.concatenate(filled)
+
+    @cached_property
+    def wet_parts(self) -> Array:
+        """How far each joint is filled, and its part under the full head of the reservoir, with
+        cracked uplift (2, n) [-].
+        """
+        last, number = self.last, len(self.model.equilibrium.interface.joints)
+        return np.array([self.filled, [last[column_of(FULL_HEAD, k)] for k in range(number)]])
 
     @cached_property
     def heads(self) -> Array:

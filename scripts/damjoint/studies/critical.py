@@ -41,6 +41,7 @@ from .critical_words import (
     events_on,
     falls_at_once,
     lost_beyond_limit,
+    passed_by_others,
     slips_whole,
     stands_beyond,
     withdrawn,
@@ -340,11 +341,20 @@ class Search:
             ways = ways_to_confirm(first, path, result, grows, mechanism)
             paths = (self.from_beginning(path, way) for path, way in ways)
             other = next((path for path in paths if path), None)
+            if other and other.passed_to > other.highest:  # the growth that ends it is passed here
+                result, path = self.at_limit(other, grows=False)
+                return self.confirmation(other, path, result, False, None)
         if other:
             return replace(result, why="", doubt=by_increments(other))
         if path.begun_by_run and result.point is path.points[0]:
             return replace(result, why="", doubt=falls_at_once(path.points[0]))
-        return self.where_water_withdraws(path, result) if path.water_withdraws else result
+        if path.water_withdraws:
+            result = self.where_water_withdraws(path, result)
+        if not path.passed_to > path.highest:
+            return result
+        result = replace(result, mode=GROWTH, why=passed_by_others(path), doubt="")
+        stands_at = max(path.passed_to, result.stands_at or 0.0)
+        return replace(result, growth=float(path.highest), stands_at=float(stands_at))
 
     def where_water_withdraws(self, path: FailurePath, result: CriticalValue) -> CriticalValue:
         """A result above which the water withdraws from the crack, and to which other ways lead:
@@ -370,18 +380,15 @@ class Search:
         None if they lead to the same highest level.
         """
         if repeats_whole(path):
-            precision = PRECISION / 2 if path.loses_cohesion else PRECISION
-            return self.from_beginning(path, SHORTER, precision)
+            return self.from_beginning(path, SHORTER)
         other = path.repeated()
         if other:
             self.trials[-1] = replace(self.trials[-1], path=other)
         return other
 
-    def from_beginning(
-        self, path: FailurePath, way: Way, precision: float = PRECISION
-    ) -> FailurePath | None:
+    def from_beginning(self, path: FailurePath, way: Way) -> FailurePath | None:
         """The path by another way from its beginning on, to the first unstable growth if it is;
-        None if it leads to the same highest level, to a relative precision.
+        None if it leads to the same highest level, to its precision.
         """
         case, to_growth = path.case, path.to_growth
         if way.levels:
@@ -395,7 +402,7 @@ class Search:
         )
         other.unstable_fall = way.unstable_fall
         other, _ = finished(other)
-        differs = path.widen(other, precision)
+        differs = path.widen(other, path.precision)
         other.interval = path.interval
         return other if differs else None
 

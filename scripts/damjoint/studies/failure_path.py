@@ -21,8 +21,8 @@ from ..joint.interface import Interface
 from ..model import process_zone
 from ..model.loads import Loading
 from ..model.results import HISTORY, Columns, column_of, with_all_joints
-from ..solver.controls import LevelControl
-from ..solver.history import History, JointState
+from ..solver.controls import DisplacementControl, LevelControl
+from ..solver.history import FULL_HEAD, History, JointState
 from ..solver.load_stepper import SAME_TIME, LoadStepper
 from ..solver.path import (
     BY_LEVEL,
@@ -66,7 +66,8 @@ RUN_RISE = 0.05
 
 #: At how many levels, of twice the rise each, relaxation is tried just above the highest one.
 RISES = 4
-#: The part by which a joint is less filled under a rising level where the water withdraws.
+#: The part by which uplift is less and, of the joint, by which the crack under the full head is
+#: shorter, under a rising level, where the water withdraws [-].
 WITHDRAWN = 0.005
 
 #: Relative distance from the end of a path to the level above it that a run must not reach: up to
@@ -139,6 +140,9 @@ class FailurePath(EquilibriumPath):
         self.stepped_to: list[Point] = []
         #: whether it has been continued from a run, see `run_on`
         self.ran_on = False
+        #: the highest level [m] of other paths that pass the unstable growth at its own highest
+        #: one; -inf: none
+        self.passed_to = -np.inf
         #: the runs from the beginning, by the level to which they were to lead
         self.runs: dict[float, LoadStepper] = known.runs if known else {}
         #: the part of a joint that may open or soften before a displacement is prescribed
@@ -385,6 +389,17 @@ class FailurePath(EquilibriumPath):
         """Whether the path leads out of the crack's water, or ends where it enters."""
         return not self.to_growth and (self.water_withdraws or (self.entering and self.ended))
 
+    def overshoots(self, begin: Point, end: Point, control: DisplacementControl, kind: str) -> bool:
+        """See `EquilibriumPath.overshoots`."""
+        least = PRECISION / 2 * end.level
+        if not self.entering or end.level <= max(begin.level + least, self.highest):
+            return False
+        cracks = (column_of("crack_length", number) for number in range(len(self.case.joints)))
+        if all(end.last[name] <= begin.last[name] for name in cracks):
+            return False
+        filled = self.step(end, end.further(control, 0.0), 0.0, kind)
+        return filled is None or filled.level < end.level - least
+
     def fill_on(self) -> None:
         """Continue from the highest level as filling does, which lets no water out and follows no
         falling level: by relaxation at a level just above, if others follow that equilibrium; once
@@ -539,32 +554,36 @@ class FailurePath(EquilibriumPath):
 
     @property
     def counted(self) -> int:
-        """The number of points up to the largest uplift, if the water withdraws after it: far below
-        the highest level it does as the dam fails.
+        """The number of points up to the last one with as much uplift, or as long a crack full of
+        water, as any, if the water withdraws after it: far below the highest level it does as the
+        dam fails.
         """
         number, levels = len(self.points), np.array([point.level for point in self.points])
         if not self.entering or not number or levels[-1] < NEAR_HIGHEST * levels.max():
             return number
-        filled, lower = np.array([point.filled for point in self.points]), levels < levels[-1]
-        largest = filled[lower].max(axis=0, initial=0.0)
-        for joint in np.flatnonzero(filled[-1] < (1 - WITHDRAWN) * largest):
-            full = lower & (filled[:, joint] == largest[joint])
-            number = min(number, int(np.argmax(full)) + 1)
+        parts, lower = [point.wet_parts for point in self.points], levels < levels[-1]
+        for wet in np.array(parts).transpose(2, 0, 1):  # of a joint: (points, 2)
+            largest = wet[lower].max(axis=0, initial=0.0)
+            # where the tailwater enters a joint, its uplift is less above the same crack
+            if np.all(wet[-1] < largest - WITHDRAWN * np.array([largest[0], 1.0])):
+                full = np.any(wet >= largest - ROUND_OFF, axis=1)
+                number = min(number, int(np.flatnonzero(full)[-1]) + 1)
         return number
 
     def has_full_uplift(self, history: History) -> BoolArray:
         """In which steps of a history the water reaches as far in all joints as on the path, before
-        it withdraws.
+        it withdraws: by the uplift or by the crack that is full of it.
         """
         rows, equilibrium = history.rows, self.stepper.model.equilibrium
-        full = np.full(len(rows["level"]), True)
+        largest = np.max([point.wet_parts for point in self.admissible], axis=0)
+        full = np.full(len(history), True)
         for number, joint in enumerate(equilibrium.interface.joints):
-            largest = max(point.filled[number] for point in self.admissible)
             uplifts = joint.width * np.array(rows[column_of("U", number)])
             shares = filled_part(
                 joint, equilibrium.unit_weight, uplifts, rows["level"], rows["tail_level"]
             )
-            full &= shares >= (1 - ROUND_OFF) * largest
+            wet = np.array([shares, rows[column_of(FULL_HEAD, number)]])
+            full &= np.any(wet >= largest[:, [number]] - ROUND_OFF, axis=0)
         return full
 
     def opens_beyond(self, history: History) -> bool:
@@ -609,10 +628,43 @@ class FailurePath(EquilibriumPath):
         return other
 
     @property
+    def precision(self) -> float:
+        """Relative difference up to which its highest level and those of other ways are the same:
+        less where they differ in each point that loses its cohesion.
+        """
+        return PRECISION / 2 if self.loses_cohesion else PRECISION
+
+    @property
     def varies(self) -> bool:
         """Whether paths by longer increments have had quite another highest level."""
         lowest, highest = self.interval
         return highest - lowest > ABOVE * highest
+
+    def widen(self, other: EquilibriumPath, precision: float) -> bool:
+        """See `EquilibriumPath.widen`. Where water enters the crack of a joint that softens, a path
+        may pass the unstable growth at the highest level of another one, and reach a higher level:
+        they agree on the growth, and the lower path is the one to follow.
+        """
+        assert isinstance(other, FailurePath)
+        low, high = (self, other) if self.highest < other.highest else (other, self)
+        apart = high.highest > (1 + precision) * low.highest
+        shown = self.entering and self.softens and not self.to_growth and not low.slides
+        if not (apart and shown and high.grows_at(low.highest)):
+            return super().widen(other, precision)
+        low.passed_to = max(low.passed_to, high.highest, high.passed_to)
+        return self is high
+
+    def grows_at(self, level: float) -> bool:
+        """Whether a crack grows unstably at a level [m] on the way to its highest one, to the
+        precision: the level falls from there by as much, or the branch is left there for a state
+        with much less tension.
+        """
+        levels, points = self.levels[: self.top + 1], self.points
+        highest = np.maximum.accumulate(levels)
+        fallen = np.flatnonzero(levels < (1 - self.unstable_fall) * highest)
+        left = [n for n in self.starts if n < len(levels) and points[n].leaps(points[n - 1])]
+        before = highest[[*fallen, *(n - 1 for n in left)]]
+        return bool(np.any(np.abs(before - level) <= PRECISION * level))
 
     @property
     def passed_growth(self) -> float | None:
