@@ -586,6 +586,20 @@ def test_a_growth_that_other_paths_pass_is_the_critical_level(first):
 
 
 @pytest.mark.heavy
+@pytest.mark.parametrize("first", [16.35, 27.25])
+def test_a_level_after_growth_is_not_the_highest_if_it_is_the_same(first):
+    """An increment over the growth at 57.275 m leads to 57.299 m, a shorter one to 57.248 m: either
+    57.299 or 57.275 m was confirmed.
+    """
+    section = {"dam_height": 54.5, "dam_base": 40.28, "dam_crest": 8.781, "n_joint": 40}
+    joint = {"K_N": 5.92e11, "K_T": 3.996e11, "mu": 0.74, "adhesion": 149e3, "sigma_max": 160e3}
+    joint |= {"law": "bond", "G_f": 92.6, "G_t": 103, "uplift": "cracked"}
+    concrete = {"E": 1.05e10, "E_found": 2.016e10, "nu": 0.191}
+    _, answer = search_result("dam", settings=section | joint | concrete, levels=f"{first}")
+    assert answer.confirmed and answer.value == pytest.approx(57.275, rel=path.PRECISION / 2)
+
+
+@pytest.mark.heavy
 def test_no_level_is_the_highest_as_water_has_not_entered_the_points_opened_in_a_step():
     """It enters in the next one, and the level falls: by 1 % from 73.643 m, or from 73.657 m by
     shorter increments, while the first points break at 73.588 m.

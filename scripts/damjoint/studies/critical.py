@@ -726,10 +726,11 @@ def finished(path: FailurePath) -> tuple[FailurePath, bool]:
             path = path.first_branch()
         path.refine()
         if not path.highest > highest:  # the rise before has led no further
-            return path, grows
+            break
         highest = path.highest
         if not (path.rise_on() or path.run_on() or path.step_over()):
-            return path, grows
+            break
+    return path.up_to_growth(), grows
 
 
 def of_each(values: list[float]) -> Setting:

@@ -52,32 +52,31 @@ def ways_to_confirm(
     first: the path to the level; path: the same, continued beyond it; grows: whether a crack grows
     unstably there; mechanism: whether a mechanism confirms it.
     """
-    repeated, ways = repeats_whole(first), list[tuple[FailurePath, Way]]()
-    grows_unstably, enters = bool(result.why) and result.leads_higher, path.entering
-    lower = path, lower_begin(path.case)
-    # the growth of a single point may be passed over
-    over = (grows_unstably and not enters) or (grows and first.releases_shear)
-    if over or first.nearly_grows:
-        ways += ((first, way) for way in over_growth(first, repeated))
-    if (result.why or path.water_withdraws) and not result.leads_higher:
-        if result.growth is None:
-            further = at_end(path, repeated and path is first, mechanism)
-            ways += ((path, way) for way in further)
-        if first.weighed_with_water:
-            ways.append(lower)
-    if first.loses_cohesion and not (first.coarse or first.weighed_with_water):
-        # which points are left depends on all increments
-        ways.append(lower)
+    repeated, shown, enters = repeats_whole(first), bool(result.why), path.entering
+    grows_unstably = shown and result.leads_higher
+    ends = (shown or path.water_withdraws) and not result.leads_higher
     # which points the water reaches, and which ones close again, depends on the increments
-    if path.water_withdraws or (path.ran_on and not path.slides):
-        ways += lower, (path, LONGER)
-    elif grows_unstably and enters and not first.to_growth:  # long ones may pass it over
-        ways.append((path, replace(lower[1], share=SHORTER.share)))
-        if path.passed_growth is not None:  # to which branch depends on them, too
-            ways.append((path, LONGER))
-    elif enters and path.softens and mechanism:
-        ways.append(lower)
-    return list(dict.fromkeys(ways))
+    parted = path.water_withdraws or (path.ran_on and not path.slides)
+    enters_beyond = grows_unstably and enters and not (parted or first.to_growth)
+    lower, longer = (path, lower_begin(path.case)), (path, LONGER)
+    over = [(first, way) for way in over_growth(first, repeated)]
+    further = [(path, way) for way in at_end(path, repeated and path is first, mechanism)]
+    ways: tuple[tuple[bool, list[tuple[FailurePath, Way]]], ...] = (
+        # the growth of a single point may be passed over
+        (grows_unstably and not enters, over),
+        (grows and first.releases_shear, over),
+        (first.nearly_grows, over),
+        (ends and result.growth is None, further),
+        (ends and first.weighed_with_water, [lower]),
+        # which points are left depends on all increments
+        (first.loses_cohesion and not (first.coarse or first.weighed_with_water), [lower]),
+        (parted, [lower, longer]),
+        # long ones may pass it over, and to which branch depends on them, too
+        (enters_beyond, [(path, replace(lower[1], share=SHORTER.share))]),
+        (enters_beyond and path.passed_growth is not None, [longer]),
+        (enters and path.softens and mechanism and not (parted or enters_beyond), [lower]),
+    )
+    return list(dict.fromkeys(way for applies, of in ways if applies for way in of))
 
 
 def falls_by_water(path: FailurePath) -> bool:

@@ -627,6 +627,22 @@ class FailurePath(EquilibriumPath):
         other.ended = True
         return other
 
+    def up_to_growth(self) -> FailurePath:
+        """The path up to an unstable growth of a crack that water enters, if its highest level is
+        the same up to what levels after growth are compared with; itself if there is none.
+        """
+        if self.to_growth or not (self.entering and self.softens):
+            return self
+        for number in self.starts:
+            before, after = self.points[number - 1 : number + 1]
+            near = self.levels[:number].max() > (1 - ABOVE) * self.highest
+            if number <= self.top and near and after.leaps(before):
+                other = self.copied()
+                other.cut_after(number - 1)
+                other.ended = True
+                return other
+        return self
+
     @property
     def precision(self) -> float:
         """Relative difference up to which its highest level and those of other ways are the same:
