@@ -710,17 +710,17 @@ class EquilibriumPath:
         if point.is_last:
             return top, self.highest
         last = min(self.counted, len(self.points) - 1)
-        bounds = [(self.possible(first), first) for first in range(last)]
+        bounds = [(self.possible(first, top), first) for first in range(last)]
         possible, first = max(bounds, default=(self.highest, top))
         return first, max(possible, self.highest)
 
-    def possible(self, first: int) -> float:
+    def possible(self, first: int, top: int) -> float:
         """The level [m] that may be between a point and the next one: the bound, or, away from the
-        highest level, twice as far above both of them, as levels may rise faster than the lines
-        through the neighbours.
+        highest point, twice as far above both of them, as levels may rise faster than the lines
+        through the neighbours. top: the number of the highest point.
         """
         bound, ends = self.bound(first), max(p.level for p in self.points[first : first + 2])
-        near = first <= self.top <= first + 1
+        near = first <= top <= first + 1
         return bound if near else ends + CONVEX * (bound - ends)
 
     def bound(self, first: int, sign: int = 1) -> float:
