@@ -41,7 +41,6 @@ from .critical_words import (
     events_on,
     falls_at_once,
     lost_beyond_limit,
-    passed_by_others,
     slips_whole,
     stands_beyond,
     withdrawn,
@@ -73,6 +72,9 @@ AFTER = {"by displacement": False, "by relaxation": True}
 
 #: The mode of a level at which a crack grows unstably, and beyond which there are equilibria.
 GROWTH = "unstable crack growth"
+
+#: What is said of a level at which a crack grows unstably on all paths, which some of them pass.
+PASSED = "there the crack grows unstably, on all paths to the same level; some pass it"
 
 #: Relative distance within which the bound of statics confirms a critical level below it.
 NEAR_BOUND = 0.02
@@ -352,9 +354,10 @@ class Search:
             result = self.where_water_withdraws(path, result)
         if not path.passed_to > path.highest:
             return result
-        result = replace(result, mode=GROWTH, why=passed_by_others(path), doubt="")
-        stands_at = max(path.passed_to, result.stands_at or 0.0)
-        return replace(result, growth=float(path.highest), stands_at=float(stands_at))
+        result = replace(result, mode=GROWTH, why=PASSED, doubt="")
+        highest = float(max(path.passed_to, result.stands_at or 0.0))
+        after = {"by other increments": highest}
+        return replace(result, growth=float(path.highest), stands_at=None, after=after)
 
     def where_water_withdraws(self, path: FailurePath, result: CriticalValue) -> CriticalValue:
         """A result above which the water withdraws from the crack, and to which other ways lead:

@@ -57,14 +57,6 @@ def stands_beyond(end: str, level: float) -> str:
     return f"{end}; but a run stands at {level:.6g} m, {where}"
 
 
-def passed_by_others(path: FailurePath) -> str:
-    """What is said of unstable growth at the highest level of a path that others pass."""
-    return (
-        "there the crack grows unstably, on all paths to the same level; those that pass it reach "
-        f"up to {path.passed_to:.6g} m, in a state that depends on the increments"
-    )
-
-
 def end_at_drains(path: FailurePath) -> str:
     """What is said of a path that ends where a crack may take the effect of drains."""
     return (
