@@ -682,10 +682,16 @@ class EquilibriumPath:
         """The level [m] of the first limit point among so many points, after which the level falls
         unstably, or by a part of such a fall; None if there is none.
         """
+        before = self.levels_before_falls(number, part)
+        return float(before[0]) if len(before) else None
+
+    def levels_before_falls(self, number: int, part: float = 1.0) -> Array:
+        """The highest level [m] before each of so many points at which it has fallen unstably, or
+        by a part of such a fall.
+        """
         levels = self.levels[:number]
         highest = np.maximum.accumulate(levels)
-        falls = np.flatnonzero(levels < (1 - part * self.unstable_fall) * highest)
-        return float(highest[falls[0]]) if len(falls) else None
+        return highest[levels < (1 - part * self.unstable_fall) * highest]
 
     def cut_after(self, number: int) -> None:
         """Remove the points after one of a number."""

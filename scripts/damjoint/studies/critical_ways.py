@@ -57,7 +57,7 @@ def ways_to_confirm(
     ends = (shown or path.water_withdraws) and not result.leads_higher
     # which points the water reaches, and which ones close again, depends on the increments
     parted = path.water_withdraws or (path.ran_on and not path.slides)
-    enters_beyond = grows_unstably and enters and not (parted or first.to_growth)
+    grows_with_water = grows_unstably and enters and not (parted or first.to_growth)
     lower, longer = (path, lower_begin(path.case)), (path, LONGER)
     over = [(first, way) for way in over_growth(first, repeated)]
     further = [(path, way) for way in at_end(path, repeated and path is first, mechanism)]
@@ -72,9 +72,9 @@ def ways_to_confirm(
         (first.loses_cohesion and not (first.coarse or first.weighed_with_water), [lower]),
         (parted, [lower, longer]),
         # long ones may pass it over, and to which branch depends on them, too
-        (enters_beyond, [(path, replace(lower[1], share=SHORTER.share))]),
-        (enters_beyond and path.passed_growth is not None, [longer]),
-        (enters and path.softens and mechanism and not (parted or enters_beyond), [lower]),
+        (grows_with_water, [(path, replace(lower[1], share=SHORTER.share))]),
+        (grows_with_water and path.passed_growth is not None, [longer]),
+        (enters and path.softens and mechanism and not (parted or grows_with_water), [lower]),
     )
     return list(dict.fromkeys(way for applies, of in ways if applies for way in of))
 

@@ -27,7 +27,7 @@ def falls_at_once(point: Point) -> str:
 
 def beyond_limit(path: FailurePath) -> str:
     """What is said of unstable crack growth at the highest level of a branch."""
-    beyond = f"the equilibria beyond it are lower, down to {path.lowest_beyond:.6g} m"
+    beyond = f"the equilibria beyond it are lower, down to {path.lowest_after_top:.6g} m"
     if path.top + 1 == len(path.points):
         beyond = "no increment of the displacement, however short, leads on"
     return f"there the crack grows unstably: {beyond}, and shorter ones lead to the same level"
@@ -35,7 +35,7 @@ def beyond_limit(path: FailurePath) -> str:
 
 def lost_beyond_limit(path: FailurePath) -> str:
     """What is said of a path that is lost beyond the limit point, or not followed farther."""
-    low = path.lowest_beyond
+    low = path.lowest_after_top
     end = f"followed below {STRENGTH_LOST:g} of it" if path.loses_strength else "found"
     return (
         f"there the level has a limit point: the equilibria beyond it are lower, down to {low:.6g} "

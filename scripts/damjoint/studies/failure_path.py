@@ -379,7 +379,7 @@ class FailurePath(EquilibriumPath):
             if self.leads_out and self.points[self.top] is not self.dry_beyond:
                 self.fill_on()
             if self.to_growth and self.top + 1 < len(self.points):
-                self.refine(self.lowest_beyond / (1 - self.unstable_fall))  # how far it falls
+                self.refine(self.lowest_after_top / (1 - self.unstable_fall))  # how far it falls
                 self.refine_fall()
         if not self.reached:
             self.refine(self.target)
@@ -601,7 +601,7 @@ class FailurePath(EquilibriumPath):
         return any(n < count for n in self.jumps) or self.growth_until(count) is not None
 
     @property
-    def lowest_beyond(self) -> float:
+    def lowest_after_top(self) -> float:
         """The lowest level from its highest one on [m]."""
         return min(point.level for point in self.points[self.top :])
 
@@ -622,26 +622,39 @@ class FailurePath(EquilibriumPath):
 
     def first_branch(self) -> FailurePath:
         """The path up to the first unstable growth by which it has passed to another branch."""
+        return self.up_to(self.jumps[0] - 1)
+
+    def up_to(self, number: int) -> FailurePath:
+        """The path that ends at a point of a number."""
         other = self.copied()
-        other.cut_after(self.jumps[0] - 1)
+        other.cut_after(number)
         other.ended = True
         return other
+
+    @property
+    def passes_growth(self) -> bool:
+        """Whether it is followed beyond unstable growth: water enters a crack that softens."""
+        return self.entering and self.softens and not self.to_growth
+
+    @property
+    def branches_with_less_tension(self) -> list[int]:
+        """The numbers of the first points of branches, up to the highest point, that have much less
+        tension than the point before: they are reached by unstable crack growth.
+        """
+        points, top = self.points, self.top
+        return [n for n in self.starts if n <= top and points[n].leaps(points[n - 1])]
 
     def up_to_growth(self) -> FailurePath:
         """The path up to an unstable growth of a crack that water enters, if its highest level is
         the same up to what levels after growth are compared with; itself if there is none.
         """
-        if self.to_growth or not (self.entering and self.softens):
+        if not (self.passes_growth and self.starts):
             return self
-        for number in self.starts:
-            before, after = self.points[number - 1 : number + 1]
-            near = self.levels[:number].max() > (1 - ABOVE) * self.highest
-            if number <= self.top and near and after.leaps(before):
-                other = self.copied()
-                other.cut_after(number - 1)
-                other.ended = True
-                return other
-        return self
+        highest = np.maximum.accumulate(self.levels)
+        least = (1 - ABOVE) * self.highest
+        near = (n for n in self.branches_with_less_tension if highest[n - 1] > least)
+        number = next(near, None)
+        return self if number is None else self.up_to(number - 1)
 
     @property
     def precision(self) -> float:
@@ -664,8 +677,7 @@ class FailurePath(EquilibriumPath):
         assert isinstance(other, FailurePath)
         low, high = (self, other) if self.highest < other.highest else (other, self)
         apart = high.highest > (1 + precision) * low.highest
-        shown = self.entering and self.softens and not self.to_growth and not low.slides
-        if not (apart and shown and high.grows_at(low.highest)):
+        if not (apart and self.passes_growth and not low.slides and high.grows_at(low.highest)):
             return super().widen(other, precision)
         low.passed_to = max(low.passed_to, high.highest, high.passed_to)
         return self is high
@@ -675,11 +687,9 @@ class FailurePath(EquilibriumPath):
         precision: the level falls from there by as much, or the branch is left there for a state
         with much less tension.
         """
-        levels, points = self.levels[: self.top + 1], self.points
-        highest = np.maximum.accumulate(levels)
-        fallen = np.flatnonzero(levels < (1 - self.unstable_fall) * highest)
-        left = [n for n in self.starts if n < len(levels) and points[n].leaps(points[n - 1])]
-        before = highest[[*fallen, *(n - 1 for n in left)]]
+        highest = np.maximum.accumulate(self.levels)
+        branches = [highest[number - 1] for number in self.branches_with_less_tension]
+        before = np.array([*self.levels_before_falls(self.top + 1), *branches])
         return bool(np.any(np.abs(before - level) <= PRECISION * level))
 
     @property
@@ -687,11 +697,8 @@ class FailurePath(EquilibriumPath):
         """The level [m] below its highest one at which its branch was left for a state with much
         less tension: unstable crack growth; None if there is none.
         """
-        for number in self.starts:
-            before, after = self.points[number - 1 : number + 1]
-            if number <= self.top and after.leaps(before):
-                return before.level
-        return None
+        numbers = self.branches_with_less_tension
+        return self.points[numbers[0] - 1].level if numbers else None
 
     # -- refinement of its end
     # ----------------------------------------------------------------------------------------------
