@@ -1,4 +1,4 @@
-"""Benchmark of scenes that are hard to solve in 2D: what they wait for."""
+"""Benchmark of scenes that are hard to solve in 2D, and of critical levels: what they wait for."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 from unittest.mock import patch
 
+import numpy as np
 from damjoint.input.case import Case
 from damjoint.input.resolve import load
 from damjoint.joint.interface import interface_of
@@ -19,6 +20,7 @@ from damjoint.solver import step
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.solver.newton import NotConverged
 from damjoint.statics.verdict import verdict
+from damjoint.studies.critical import Search
 from threadpoolctl import threadpool_limits
 
 from .bench_table import Measurements, Table
@@ -37,6 +39,20 @@ NAMED: dict[str, tuple[str, dict[str, Any]]] = {
 SEED, RANDOM, SLOWEST = 1, 200, 10
 #: The same of the short benchmark.
 FEW = 4
+
+#: Rows of `sweep dam --critical`: settings, the parameter that is varied, and its values in two
+#: rows, of which the second one is measured.
+ROWS: dict[str, tuple[dict[str, Any], str, tuple[float, float]]] = {
+    "friction": ({"law": "friction"}, "mu", (0.70, 0.72)),
+    "friction, cracked": ({"law": "friction", "uplift": "cracked"}, "mu", (0.70, 0.72)),
+    "bond": ({"law": "bond"}, "sigma_max", (0.200e6, 0.202e6)),
+    "bond, cracked": ({"law": "bond", "uplift": "cracked"}, "sigma_max", (0.200e6, 0.202e6)),
+    "rupture": ({"law": "rupture"}, "sigma_max", (0.200e6, 0.202e6)),
+    "endo": ({"law": "endo", "adhesion": 0.26e6, "mu": 1.0}, "sigma_max", (0.200e6, 0.202e6)),
+}
+
+#: How often a linear system is timed, of which the best counts.
+REPETITIONS = 20
 
 
 class Clock:
@@ -73,6 +89,23 @@ class Clock:
         self.iterations += 1
         return self.timed("linear systems", function)(*arguments)
 
+    def columns(self, unknowns: int, spent: float) -> tuple[Any, ...]:
+        """COLUMNS of a solution that has taken so many seconds."""
+        shares = (100 * seconds / spent for seconds in self.seconds.values())
+        counts = self.solutions, self.given_up, self.iterations
+        return unknowns, spent, *counts, *shares, self.iterations * factorisation(unknowns)
+
+
+def factorisation(unknowns: int) -> float:
+    """The seconds that LAPACK takes to solve a dense system, the best of REPETITIONS."""
+    matrix = np.eye(unknowns) + np.random.default_rng(0).random((unknowns, unknowns)) / unknowns
+    right, seconds = np.ones(unknowns), list[float]()
+    for _ in range(REPETITIONS):
+        start = time.perf_counter()
+        np.linalg.solve(matrix, right)
+        seconds.append(time.perf_counter() - start)
+    return min(seconds)
+
 
 @contextmanager
 def clock() -> Iterator[Clock]:
@@ -90,13 +123,19 @@ def clock() -> Iterator[Clock]:
         yield measured
 
 
+#: What is measured of scenes and rows: CPU seconds, numbers, the parts of the seconds [%] in
+#: solutions that were given up, in linear systems and in the water, and the seconds that LAPACK
+#: takes to factorise as many matrices of all unknowns, below which no Newton's method comes that
+#: factorises one in each iteration.
+COLUMNS = (
+    *("unknowns", "seconds", "solutions", "given up", "iterations"),
+    *("given up [%]", "linear systems [%]", "water [%]", "LAPACK alone"),
+)
+
+
 def hard(measurements: Measurements) -> Table:
-    """Solve hard scenes and random dams in 2D: CPU seconds of the load steps, and the parts of it
-    [%] in solutions that were given up, in linear systems and in the water.
-    """
-    parts = "given up [%]", "linear systems [%]", "water [%]"
-    numbers = "unknowns", "seconds", "solutions", "given up", "iterations"
-    table = Table("hard", "scene", *numbers, *parts, "end")
+    """Solve hard scenes and random dams in 2D: COLUMNS of the load steps."""
+    table = Table("hard", "scene", *COLUMNS, "end")
     scenes = {name: partial(load, *case) for name, case in NAMED.items()}
     for number in range(FEW if measurements.short else RANDOM):
         scene = random_scene(SEED, number)
@@ -118,11 +157,34 @@ def measure(case: Case) -> tuple[Any, ...]:
         stepper = LoadStepper(case, interface_of(case))
         start = time.process_time()
         result = stepper.run()
-        spent = time.process_time() - start
-    shares = (100 * seconds / spent for seconds in measured.seconds.values())
-    counts = measured.solutions, measured.given_up, measured.iterations
-    unknowns = stepper.model.equilibrium.bulk.size
-    return unknowns, spent, *counts, *shares, verdict(result)
+        columns = measured.columns(stepper.model.equilibrium.bulk.size, time.process_time() - start)
+    return *columns, verdict(result)
+
+
+def rows(measurements: Measurements) -> Table:
+    """Compute a further row of sweeps with `--critical`: COLUMNS of the search of the critical
+    level, the level, and whether it is confirmed.
+    """
+    table = Table("rows", "row", *COLUMNS, "level [m]", "confirmed")
+    for name in track(list(ROWS)[:1] if measurements.short else ROWS, "rows"):
+        table.add_measured(measurements, (name,), partial(measure_row, *ROWS[name]))
+    return table
+
+
+def measure_row(
+    settings: dict[str, Any], varied: str, values: tuple[float, float]
+) -> tuple[Any, ...]:
+    """Measure a row after another one; returns the columns of `rows` but for the first."""
+    with threadpool_limits(1):
+        for value in values:  # the first one condenses the bodies
+            search = Search(load("dam", settings | {varied: value}), "level")
+            with clock() as measured:
+                start = time.process_time()
+                answer = search.find()
+                spent = time.process_time() - start
+        unknowns = search.trials[0].path.stepper.model.equilibrium.bulk.size
+        columns = measured.columns(unknowns, spent)
+    return *columns, answer.value, "yes" if answer.confirmed else "no"
 
 
 def slowest(table: Table) -> Table:

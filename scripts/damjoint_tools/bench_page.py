@@ -171,6 +171,7 @@ def page(
         *of_accuracy(tables),
         *of_estimates(tables["estimates"]),
         *of_critical(tables["critical"]),
+        *of_rows(tables["rows"]),
         *of_costs(tables["switches"], tables["sweeps"]),
         "## Growth with size",
         "; ".join(bench_cost.exponents(tables["growth"])) + ". Uniform refinement, cold start. "
@@ -245,6 +246,21 @@ def of_critical(searches: Table) -> list[str]:
         f"{searches['confirmed'].count('yes')} of {len(searches['search'])} values are confirmed. "
         "Case `dam` with the parameters of the first column, in one process.",
         as_text(searches, digits=4),
+    ]
+
+
+def of_rows(table: Table) -> list[str]:
+    """Rows of a sweep of critical levels."""
+    seconds, alone = table["seconds"], table["LAPACK alone"]
+    ratios = np.array(seconds) / alone
+    return [
+        "## Rows of a sweep of critical levels",
+        f"A row takes {min(seconds):.2g} s ({table['row'][np.argmin(seconds)]}) to "
+        f"{max(seconds):.2g} s ({table['row'][np.argmax(seconds)]}) of CPU time on condensed "
+        f"bodies, {ratios.min():.1f} to {ratios.max():.1f} times as long as LAPACK for as many "
+        "matrices of all unknowns; the other ways that have to lead to the same level are part of "
+        "it. Case `dam`, one thread, with parts of the time as for hard scenes below.",
+        as_text(table, digits=3),
     ]
 
 
@@ -385,8 +401,8 @@ def of_hard(table: Table) -> list[str]:
         f"CPU seconds of the load steps, one thread: of {len(others)} random dams half take at "
         f"most {np.median(others):.2g} s, nine of ten {np.percentile(others, 90):.2g} s, the "
         f"slowest one {others.max():.2g} s. Two further scenes and the slowest ones, with parts of "
-        "the time: in solutions that were given up, in linear systems and in the water "
-        "(`hard.csv`):",
+        "the time, in solutions that were given up, in linear systems and in the water, and the "
+        "seconds of LAPACK alone for as many matrices of all unknowns (`hard.csv`):",
         as_text(bench_hard.slowest(table)),
     ]
 
@@ -422,7 +438,7 @@ def measure(measurements: Measurements) -> tuple[dict[str, Table], list[str]]:
     studies = [bench_cost.switches, bench_cost.sweeps, bench_cost.growth, bench_cost.stress]
     studies += [bench_commands.start, bench_commands.pictures, bench_commands.critical]
     studies += [bench_commands.orders, bench_cost.engines, bench_cost.joints]
-    studies += [bench_commands.quakes, bench_hard.hard]
+    studies += [bench_commands.quakes, bench_hard.hard, bench_hard.rows]
     tables += [study(measurements) for study in studies]
     with threadpool_limits(1):
         tables.append(modelings(measurements, cases))

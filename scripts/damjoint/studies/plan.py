@@ -18,6 +18,7 @@ from ..input import parameters
 from ..input.arithmetic import arithmetic_value, explained, quantity
 from ..input.case import Case
 from ..input.resolve import varied, with_record
+from ..progress import track
 
 #: A row of a result file: texts by column.
 Row: TypeAlias = dict[str, str]
@@ -281,6 +282,12 @@ class Plan:
         """Parameters of which each row has a value; level."""
         return [*self.varied, *self.sampled, *self.tied]
 
+    @property
+    def number(self) -> int:
+        """The number of rows."""
+        drawn = next(iter(self.sampled.values()), None)
+        return math.prod(map(len, self.varied.values())) * (1 if drawn is None else len(drawn))
+
     def rows(self) -> Iterator[dict[str, Value]]:
         """The values of each row by name. Raises InputError."""
         draws = zip(*self.sampled.values(), strict=True)
@@ -422,7 +429,7 @@ def planned_cases(base: Case, plan: Plan) -> Iterator[tuple[dict[str, Value], Ca
     independent = parameters.independent()
     # Gmsh's parser resolves a case once for all rows that differ in independent parameters only
     resolved: dict[tuple[Value, ...], Case] = {}
-    for row in plan.rows():
+    for row in track(plan.rows(), "values of the rows", plan.number):
         alone = {n: v for n, v in row.items() if n in independent}
         key = tuple(v for n, v in row.items() if n not in alone)
         if key not in resolved:
