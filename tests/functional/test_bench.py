@@ -6,7 +6,10 @@ import csv
 import json
 import shutil
 
+import numpy as np
 import pytest
+from damjoint.input.resolve import load
+from damjoint.studies.critical import Search
 from damjoint_tools import bench_commands, bench_cost, bench_hard, bench_page
 from damjoint_tools.bench_table import Measurements
 
@@ -85,6 +88,23 @@ def test_what_hard_scenes_wait_for(measurements):
 
 
 @pytest.mark.heavy
+def test_a_row_of_critical_levels(measurements):
+    """Its level is that of the search alone; nothing is searched in its time but it."""
+    table = bench_hard.rows(measurements)
+    (settings, varied, (_, value)), (row,) = bench_hard.ROWS["friction"], table["row"]
+    search = Search(load("dam", settings | {varied: value}), "level")
+    with bench_hard.clock() as measured:
+        answer = search.find()
+    assert (row, table["confirmed"]) == ("friction", ["yes"])
+    assert table["level [m]"] == [answer.value]
+    for name in ("solutions", "given up", "iterations"):
+        assert table[name] == [getattr(measured, name.replace(" ", "_"))]
+    assert 0 < table["LAPACK alone"][0] < np.inf
+    _, text, rows = bench_page.of_rows(table)
+    assert "A row takes" in text and rows.count("\n") == 2
+
+
+@pytest.mark.heavy
 def test_the_short_benchmark_writes_consistent_files(command, tmp_path, log):
     """Also if it is resumed: from what the tests before have measured, where they ran."""
     (tmp_path / "bench").mkdir()
@@ -92,7 +112,7 @@ def test_the_short_benchmark_writes_consistent_files(command, tmp_path, log):
         shutil.copy(log, tmp_path / "bench")
     assert command("bench", "--short", "--out", "bench")[0] == 0
     text = (tmp_path / "bench" / "benchmarks.md").read_text()
-    assert text.startswith("# Benchmarks\n") and text.count("\n## ") == 16
+    assert text.startswith("# Benchmarks\n") and text.count("\n## ") == 17
     assert (tmp_path / "bench" / "accuracy.png").read_bytes()[:4] == b"\x89PNG"
     *lines, blank, source = (tmp_path / "bench" / "modelings.md").read_text().splitlines()
     assert len(lines) == 2 + len(MODELINGS) and not blank and source in text
