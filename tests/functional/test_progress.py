@@ -166,11 +166,13 @@ def test_the_forecast_grows_with_bodies_joints_and_steps():
         {"found_side": 1e3},
         {"found_depth": 2e3},
         {"dim": 3.0, "n_layers": 2.0, "n_joint": 30.0},
+        {"dim": 3.0, "mesh_pattern": "free", "order": 1.0, "n_layers": 20.0, "n_joint": 30.0}
+        | {"thickness": 25.0, "h_dam": 5.0, "h_found": 12.0},
     ],
 )
 def test_the_unknowns_of_the_bodies_are_forecast(settings):
     """Of the mesh, within a factor of five: also where the joint's elements are longer than a body
-    is high, and in a large foundation.
+    is high, in a large foundation, and in a free mesh in 3D, coarser across the valley far from it.
     """
     case = load("dam", settings)
     dim = case["dim"]

@@ -8,6 +8,8 @@ import resource
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from .. import RunError
 from ..input.case import Case
 from ..progress import INTERVAL, clock
@@ -48,15 +50,24 @@ def bulk_size(case: Case) -> float:
 
     A triangle covers half of the square of its size. From the joint, whose elements are no larger
     there than a body is high, sizes grow to those of the crest and of the foundation's boundary;
-    beside the joint with the distance from it. Order 2 has four unknowns a triangle.
+    beside the joint with the distance from it. Order 2 has four unknowns a triangle. In 3D a free
+    mesh is coarser across the valley, too, where its triangles are larger.
     """
     dim, order, near = int(case["dim"]), int(case["order"]), case.joint_length / case["n_joint"]
-    height, depth, far = case["dam_height"], case["found_depth"], case["h_found"]
-    dam = (case["dam_base"] + case["dam_crest"]) / 2 / case["h_dam"] / min(near / height, 1)
+    height, depth, crest, far = (
+        case[name] for name in ("dam_height", "found_depth", "h_dam", "h_found")
+    )
+    dam = (case["dam_base"] + case["dam_crest"]) / 2 / crest / min(near / height, 1)
     below = case["dam_base"] / far / min(near / depth, 1)
     beside = 2 * case["found_side"] * depth / far**2 * (1 + max(math.log(far / near), 0))
-    triangles = 2 * (dam + below + beside)
-    return triangles * order**2 * (1 if dim == 2 else 4.5 * case["n_layers"])
+    if dim == 2:
+        return float(2 * (dam + below + beside) * order**2)
+    layers = [case["n_layers"]] * 3
+    if case["mesh_pattern"] == "free":  # 1/h^3 integrated over a linear h, over 1/h^2
+        shares = (near / crest + 1) / 2, (near / far + 1) / 2, near / far
+        layers = [max(1.0, min(share, 1.0) * case["n_layers"]) for share in shares]
+    triangles = 2 * np.dot((dam, below, beside), layers)
+    return float(triangles * order**2 * 4.5)
 
 
 def joints_size(case: Case) -> int:
