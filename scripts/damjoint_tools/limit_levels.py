@@ -3,7 +3,8 @@
     python -m damjoint_tools.limit_levels 200 --seed 1 --out out/limits.csv
 
 The dams are real ones: sections, concrete, rock and strengths as in practice, one joint on the
-base, all laws and uplifts. The same command continues a file, and prints what its rows say.
+base, LAWS and all uplifts but waterstop. The same command continues a file, and prints what its
+rows say.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ def parameters_page() -> str:
         "`lift_heights()` (`--set lift_heights=12,25`): heights of lift joints above the first "
         "joint; then the parameters of a joint may have a list with a value for each joint, "
         "`mu() = {0.9, 1, 1};` (`--set mu=0.9,1,1`): those of the group Joint, law, uplift, slope, "
-        "aperture, drains, grouting and sawing. "
+        "aperture, drains, waterstop, grouting and sawing. "
         "`downstream_face()` (`--set downstream_face=22,30,15,62`): $x$ and height of each corner "
         "of the downstream face between base and crest, upwards, in place of `neck_height` and "
         "`neck_batter`. "

@@ -232,7 +232,7 @@ def quake_section(rows: list[Row]) -> str:
         f"{len(rows)} random earthquakes of `damjoint stress --quake` ({seeds_of(rows)}), "
         "each computed by `damjoint quake`. The scenes: dams from 8 to 120 m, "
         "$E$ from 5e9 to 1e11 Pa, $K_N$ from "
-        "1e9 to 1e13 Pa/m, all laws, all uplifts, "
+        "1e9 to 1e13 Pa/m, the laws bond, friction, rupture and mixed, all uplifts but waterstop, "
         "batter, sloping joint, one to three joints (most "
         "of the lift joints with a law and water of their own); added mass, water in the crack by "
         "each rule, damping of 1 to 10 % with and without its part by the mass, "

@@ -13,7 +13,7 @@ import sys
 import damjoint as dj
 import numpy as np
 import pytest
-from damjoint import cli, runner
+from damjoint import InputError, cli, runner
 from damjoint.input.resolve import load
 from damjoint.pictures import report_picture
 from damjoint.pictures.run_picture import shear_limit
@@ -570,3 +570,13 @@ def test_the_strength_drawn_is_that_of_the_law(solve, law):
     assert slipped.any() and not slipped.all()
     assert_allclose(np.abs(rows["tau_1"][slipped]), limit[slipped], rtol=1e-6)
     assert np.all(np.abs(rows["tau_1"]) <= limit * (1 + 1e-6))
+
+
+def test_the_runs_of_several_earthquakes(tmp_path):
+    """In the order of their table; another folder is a run itself."""
+    assert report.parts_of(tmp_path) == [tmp_path]
+    (tmp_path / "records.csv").write_text("folder,record\nsecond,b.csv\nfirst,a.csv\n")
+    assert report.parts_of(tmp_path) == [tmp_path / "second", tmp_path / "first"]
+    (tmp_path / "records.csv").write_text("folder,record\n../other,b.csv\n")
+    with pytest.raises(InputError, match=r"records\.csv is damaged"):
+        report.parts_of(tmp_path)

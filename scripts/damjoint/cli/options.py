@@ -13,7 +13,10 @@ from typing import Any, NoReturn, TextIO
 
 from .. import InputError
 
-CASE = "a letter a to k (verification case SSNP142), dam, or the path of a .case file"
+CASE = (
+    "a letter a to k (verification case SSNP142), dam, another case of the package (lifts, koyna, "
+    "flood, ...), or the path of a .case file"
+)
 ENGINE = (
     "condensed (the bodies condensed onto the joint), iterative (large 3D: uncondensed), auto "
     "(default: one of these, by size and steps) or getdp (the reference GetDP model)"

@@ -26,13 +26,19 @@ def add(command: Parser) -> None:
         "--record",
         "FILE",
         repeats=True,
-        help="CSV of the ground's acceleration: time [s], horizontal and, if any, vertical, in "
-        "record_unit; repeatable: each earthquake has a folder with the name of its record "
-        "(default: that of the case)",
+        help="the ground's acceleration: a CSV file with time [s], horizontal and, if any, "
+        "vertical, in record_unit, or a file of PEER or COSMOS, or two, H.AT2+V.AT2; repeatable: "
+        "each earthquake has a folder with the name of its record (default: that of the case)",
     )
     command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_quake)")
     command.add_jobs()
-    command.add_engine(": tables only, and an interrupted run starts again")
+    command.add_argument(
+        "--engine",
+        default="auto",
+        metavar="NAME",
+        help="condensed (auto, the default) or getdp (the reference GetDP model: tables only, and "
+        "an interrupted run starts again)",
+    )
     command.add_argument(
         "--fields",
         nargs="?",

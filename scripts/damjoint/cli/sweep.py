@@ -41,7 +41,8 @@ def add_values(command: Parser) -> None:
         "--vary",
         "NAME=VALUES",
         help="values of a parameter, or of level, in its unit: NAME=V1,V2,... or "
-        "NAME=FIRST:LAST:STEP; all combinations are run (repeatable)",
+        "NAME=FIRST:LAST:STEP (FIRST, FIRST + STEP, ... up to LAST); all combinations are run "
+        "(repeatable)",
     )
     command.add_list(
         "--tie",
@@ -59,13 +60,10 @@ def add_values(command: Parser) -> None:
     command.add_argument(
         "--design",
         choices=("latin", "monte-carlo", "sobol"),
-        default="latin",
         help="Latin hypercube or independent random rows of --sample, or the design of Sobol's "
         "indices, of which N, a power of 2, has N (inputs + 2) rows (default: latin)",
     )
-    command.add_integer(
-        "--seed", 0, default=0, help="seed of the random numbers of --sample (default: 0)"
-    )
+    command.add_integer("--seed", 0, help="seed of the random numbers of --sample (default: 0)")
     command.add_list(
         "--correlate",
         "A,B=R",
@@ -106,7 +104,6 @@ def add_kind(command: Parser) -> None:
     command.add_argument(
         "--intensity",
         choices=("peak_ground_ax", "peak_ground_vx", "arias_x", "spectral_ax"),
-        default="peak_ground_ax",
         help="column that is the intensity of the fragility: largest acceleration or velocity of "
         "the ground, Arias' intensity, spectral acceleration at the dam's first period (default: "
         "peak_ground_ax)",
@@ -117,17 +114,20 @@ def call(arguments: argparse.Namespace) -> int:
     """Run damjoint sweep."""
     from ..input import parameters
     from ..studies.plan import MOTION, Limits, in_both_signs, plan_of, sample_of
+    from ..studies.result_file import check_path
     from ..studies.sweep import PlannedRows, meshed, rows_table, sweep
 
     out = arguments.out or Path(f"{Path(arguments.case).stem}_sweep.csv")
     settings = parameters.settings(arguments.settings)
-    options = {name: getattr(arguments, name) for name in ("design", "seed", "correlate")}
-    if not arguments.sample and arguments.correlate:
-        raise InputError(f"--correlate {arguments.correlate[0]}: needs --sample")
+    check_path(out)
+    of_sample = {name: getattr(arguments, name) for name in ("design", "seed", "correlate")}
+    options = {name: value for name, value in of_sample.items() if value not in (None, [])}
+    if not arguments.sample and options:
+        raise InputError(f"--{', --'.join(options)}: needs --sample")
     sample = sample_of(arguments.sample, **options) if arguments.sample else None
     limits = None if arguments.quake is None else Limits.of(arguments.quake)
-    if not limits and (arguments.record or arguments.both_signs):
-        raise InputError("--record, --both-signs: need --quake")
+    if not limits and (arguments.record or arguments.both_signs or arguments.intensity):
+        raise InputError("--record, --both-signs, --intensity: need --quake")
     motions: dict[str, list[Value]] = {}
     if arguments.record:
         motions[MOTION] = [str(file) for file in arguments.record]
@@ -147,7 +147,8 @@ def call(arguments: argparse.Namespace) -> int:
     computed = f"{count} rows computed" if count or not kept else "nothing to compute"
     say(f"{computed}{f', {kept} rows were there already' if kept else ''}; {out}\n")
     say(f"{rows_table(plan, rows, table_width(arguments))}\n")
-    report_sweep(case, plan, rows, [] if plan.sampled else planned.cases, out, arguments.intensity)
+    intensity = arguments.intensity or "peak_ground_ax"
+    report_sweep(case, plan, rows, [] if plan.sampled else planned.cases, out, intensity)
     return 0
 
 

@@ -7,7 +7,7 @@ import math
 import operator
 import re
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
 
 from .. import data, meant
@@ -206,6 +206,30 @@ def value_of(node: ast.expr, known: Mapping[str, float]) -> float:
     if not isinstance(number, float) or not math.isfinite(number):  # complex: a root of -1
         raise ValueError(number)
     return number
+
+
+def bare_number(texts: Iterable[str]) -> str:
+    """The first number without a unit in a list of which another one has a unit that is not of the
+    SI, as MPa; empty if there is none. Zero needs no unit.
+    """
+    scaled, bare = False, list[str]()
+    for text in texts:
+        try:
+            names = {part.id for part in ast.walk(parsed(text)) if isinstance(part, ast.Name)}
+            scaled |= any(units().get(name, 1.0) != 1.0 for name in names)
+            if not names and value_of(parsed(text), {}):
+                bare.append(text.strip())
+        except ValueError:  # no arithmetic
+            continue
+    return bare[0] if scaled and bare else ""
+
+
+def arguments_of(text: str) -> tuple[list[str], dict[str, str]]:
+    """Texts of the arguments and of the named arguments of a call, see `parsed_call`."""
+    node = parsed(text)
+    assert isinstance(node, ast.Call)
+    named = {word.arg: ast.unparse(word.value) for word in node.keywords if word.arg}
+    return [ast.unparse(argument) for argument in node.args], named
 
 
 def parsed_call(text: str, unit: str) -> tuple[str, list[float], dict[str, float]]:

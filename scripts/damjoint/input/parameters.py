@@ -21,7 +21,7 @@ from .. import InputError, __version__, data, meant
 from ..arrays import Setting, Value
 from ..laws import LAWS
 from ..storage import atomic_write, cached
-from .arithmetic import explained, quantity
+from .arithmetic import bare_number, explained, quantity
 
 DECLARATIONS = data("pro") / "parameters.pro"
 #: The line by which a text includes the declarations.
@@ -40,6 +40,12 @@ OF_JOINTS = (
 TEXTS = {
     **dict.fromkeys(("title", "also_uplift", "geometry", "hydrograph"), ""),
     "record": " or by --record FILE.csv",
+}
+#: Quantities that are no parameters, and what sets them.
+OPTIONS = {
+    **dict.fromkeys(("level", "levels"), "--levels, in a sweep also by --vary level=VALUES"),
+    **dict.fromkeys(("tail_level", "tail_levels"), "--tail-levels"),
+    "steps": "--steps",
 }
 #: Lists of a section's geometry, which are settings like parameters: empty by default.
 GEOMETRY_LISTS = "lift_heights", "downstream_face"
@@ -394,6 +400,8 @@ def parameter(name: str) -> Parameter:
     known = declared()
     if name in TEXTS:
         raise InputError(f'{name}: must be set in the case ({name} = "...";){TEXTS[name]}')
+    if name in OPTIONS:
+        raise InputError(f"{name}: is no parameter; it is set by {OPTIONS[name]}")
     if name not in known:
         hint = meant(name, known) or f"allowed: {', '.join(sorted(known))}"
         raise InputError(f"{name}: unknown parameter; {hint}")
@@ -416,7 +424,10 @@ def settings(pairs: Iterable[str]) -> dict[str, Setting]:
         name, equals, value = (part.strip() for part in pair.partition("="))
         if not equals:
             raise InputError(f"--set {pair}: must be NAME=VALUE")
-        values[name] = checked(name, value.split(",") if "," in value else value)
+        listed = value.split(",")
+        if bare := bare_number(listed):
+            raise InputError(f"--set {pair}: {bare} must have a unit, as the others have")
+        values[name] = checked(name, listed if "," in value else value)
     return values
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,7 +16,7 @@ import numpy as np
 from .. import InputError
 from ..arrays import Array, Settings, Value, Values
 from ..input import parameters
-from ..input.arithmetic import arithmetic_value, explained, quantity
+from ..input.arithmetic import arithmetic_value, bare_number, explained, quantity
 from ..input.case import Case
 from ..input.resolve import varied, with_record
 from ..progress import track
@@ -161,7 +162,9 @@ def values_of(text: str) -> tuple[str, list[Value]]:
     bad = InputError(f"{setting}: {rule}")
     if not equals or not values:
         raise bad
-    name = name.strip()
+    name, parts = name.strip(), re.split("[,:]", values)
+    if bare := bare_number(parts):
+        raise InputError(f"{setting}: {bare} must have a unit, as the others have")
     if ":" not in values:
         return name, [checked(name, v.strip()) for v in values.split(",")]
     try:
@@ -173,6 +176,8 @@ def values_of(text: str) -> tuple[str, list[Value]]:
     if (last - first) / step >= MOST_ROWS:
         raise InputError(f"{setting}: must give at most {MOST_ROWS} values")
     number = int((last - first) / step + ROUNDING) + 1
+    if number == 1 and last != first:
+        raise bad
     return name, [checked(name, rounded(first + i * step)) for i in range(number)]
 
 
@@ -218,10 +223,11 @@ class Limits:
 
         Raises InputError.
         """
-        bad = InputError(
-            f"--quake {text}: must be a slip > 0 m, or limits slip=S,opening=O,standing, some of "
-            "these or several of a kind"
+        rule = (
+            "must be a slip > 0 m, or limits slip=S,opening=O,standing, some of these or several "
+            "of a kind"
         )
+        bad = InputError(f"--quake {text}: {rule}")
         limits: dict[str, tuple[float, ...]] = {"slip": (), "opening": ()}
         for part in text.split(","):
             if part.strip() == STANDING:
@@ -229,9 +235,9 @@ class Limits:
             name, equals, words = (p.strip() for p in part.partition("="))
             name, words = (name, words) if equals else ("slip", name)
             try:
-                value = quantity(words)
-            except ValueError:
-                raise bad from None
+                value = quantity(words, "m")
+            except ValueError as error:
+                raise InputError(explained(f"--quake {text}", rule, error)) from None
             if name not in limits or not (math.isfinite(value) and value > 0):
                 raise bad
             limits[name] = (*limits[name], value)
@@ -396,6 +402,11 @@ def plan_with(
                 f"{option} {name}: must be given once, and not by --set, --vary, --sample or --tie "
                 "as well"
             )
+    for name, values in axes:
+        for index, value in enumerate(values):
+            if value in values[:index]:
+                option = "--record" if name == MOTION else f"--vary {name}"
+                raise InputError(f"{option}: {value} must be given once")
     if not (axes or sample or signs):
         raise InputError("--vary, --sample: one must be given, such as --vary mu=0.3:0.8:0.05")
     number = math.prod(len(values) for _, values in axes) * (sample.rows if sample else 1)

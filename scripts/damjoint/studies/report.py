@@ -26,7 +26,8 @@ from ..pictures import run_picture
 from ..pictures.drawing import figure_of, picture_style
 from ..pictures.report_picture import Picture, bands, embedded
 from ..post import stored
-from ..post.folder import read_info
+from ..post.folder import CHECK as CHECK_FILE
+from ..post.folder import RECORDS, read_info
 from ..post.summary import Table, formatted_table, joints_note, joints_table, levels_table
 from ..post.validation import shown_time
 from ..statics.gravity import GravityMethod
@@ -270,21 +271,22 @@ def page_of(sections: Sequence[RunSection | StudySection], dam: str = "") -> str
 
 
 def parts_of(folder: Path) -> list[Path]:
-    """List the folders of the runs in a folder of `damjoint check`, in its order; the folder itself
-    if it is another one.
+    """List the folders of the runs in a folder of `damjoint check`, or of several earthquakes, in
+    its order; the folder itself if it is another one.
 
-    Raises InputError if its check.csv is damaged.
+    Raises InputError if its table is damaged.
     """
-    table = folder / "check.csv"
-    if not table.is_file():
+    tables = {folder / CHECK_FILE: "case", folder / RECORDS: "folder"}
+    table = next(filter(Path.is_file, tables), None)
+    if table is None:
         return [folder]
     try:
         with table.open(newline="", encoding="utf-8") as file:
-            names = dict.fromkeys(row["case"] for row in csv.DictReader(file))
+            names = dict.fromkeys(row[tables[table]] for row in csv.DictReader(file))
     except (*stored.DAMAGED, csv.Error) as error:
-        raise InputError(f"out = {folder}: its check.csv is damaged ({error!r})") from None
+        raise InputError(f"out = {folder}: its {table.name} is damaged ({error!r})") from None
     if not all(name and is_name(name) for name in names):
-        raise InputError(f"out = {folder}: its check.csv is damaged (names of cases)")
+        raise InputError(f"out = {folder}: its {table.name} is damaged (names of folders)")
     return [folder / name for name in names]
 
 

@@ -116,6 +116,14 @@ class ResultFile:
             )
 
 
+def check_path(path: Path) -> None:
+    """Raise InputError if a file of rows can not be at a path; pictures are written beside it."""
+    if path.suffix != ".csv":
+        raise InputError(f"out = {path}: must end in .csv")
+    if not path.parent.is_dir():
+        raise InputError(f"out = {path}: must be a file in an existing folder")
+
+
 @contextlib.contextmanager
 def result_file(
     path: Path, columns: Sequence[str], numeric: Sequence[str]
@@ -125,8 +133,7 @@ def result_file(
 
     Raises InputError if it is of another sweep, damaged, or being written by another process.
     """
-    if not path.parent.is_dir():
-        raise InputError(f"out = {path}: must be a file in an existing folder")
+    check_path(path)
     if path.exists() and not path.is_file():
         raise InputError(f"out = {path}: must be a regular file")
     number = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o666)

@@ -10,7 +10,7 @@ from scipy import linalg, stats
 
 from .. import InputError
 from ..arrays import Array, IntArray
-from ..input.arithmetic import explained, parsed_call
+from ..input.arithmetic import arguments_of, bare_number, explained, parsed_call
 
 #: Distributions by scipy's names, and `normal`.
 DISTRIBUTIONS = {
@@ -48,7 +48,12 @@ def distribution(
     if kind not in DISTRIBUTIONS:
         known = "normal, lognorm, truncnorm, uniform, triang, weibull_min, gumbel_r, beta, ..."
         raise InputError(f"{message}; {kind} is none; known: {known}")
-    shapes = ", ".join((*filter(None, [DISTRIBUTIONS[kind].shapes]), "loc", "scale"))
+    shapes = [*filter(None, (DISTRIBUTIONS[kind].shapes or "").split(", "))]
+    listed, texts = arguments_of(text)
+    places = [*listed[len(shapes) :], *(texts[n] for n in ("loc", "scale") if n in texts)]
+    if bare := bare_number(places):
+        raise InputError(f"{setting}: {bare} must have a unit, as the other has")
+    arguments = ", ".join([*shapes, "loc", "scale"])
     try:
         with np.errstate(all="ignore"):
             frozen = DISTRIBUTIONS[kind](*numbers, **named)
@@ -56,7 +61,7 @@ def distribution(
     except (TypeError, ValueError, ArithmeticError):
         spread = np.nan
     if np.isnan(spread) or spread == 0:
-        raise InputError(f"{message}; {kind}({shapes}), as in scipy.stats")
+        raise InputError(f"{message}; {kind}({arguments}), as in scipy.stats")
     return frozen
 
 
