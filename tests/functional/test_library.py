@@ -114,6 +114,8 @@ def test_rows_of_a_level_or_a_time(run):
         run.joint.at(level=35)
     with pytest.raises(dj.InputError, match="must have a level or a time"):
         run.joint.at()
+    with pytest.raises(dj.InputError, match="not both"):
+        run.joint.at(level=40, time=1)
 
 
 def test_readable_names_are_those_of_columns(run):
@@ -460,3 +462,11 @@ def test_the_examples_of_the_docstrings(name, tmp_path, monkeypatch):
     )
     result = doctest.DocTestRunner().run(example)
     assert result.attempted and not result.failed
+
+
+def test_numbers_of_numpy_are_numbers():
+    """Others are refused as by the command."""
+    assert dj.case("dam", n_joint=np.int64(10), mu=np.float32(0.5)).values["mu"] == 0.5
+    for settings, words in (({"steps": 2.5}, "steps = 2.5"), ({"mu": None}, "mu = None")):
+        with pytest.raises(dj.InputError, match=words):
+            dj.case("dam", **settings)

@@ -143,3 +143,13 @@ def test_modes_in_3d_and_of_several_joints(command, tmp_path, texts_drawn):
         rows = json.loads((tmp_path / words[0] / "run.json").read_text())["modes"]
         first = f"mode 1: {rows['frequency'][0]:.3g} Hz"
         assert any(text.startswith(first) for text in texts_drawn.pop())
+
+
+def test_a_wrong_number_leaves_the_modes_of_before(command, tmp_path):
+    """Also one that only the number of unknowns refuses."""
+    words = "modes", "dam", "--set", "n_joint=4", "--set", "order=1", "--no-picture", "--out", "m"
+    assert command(*words)[0] == 0
+    before = (tmp_path / "m" / "modes.csv").read_text()
+    code, _, err = command(*words, "--number", "100000")
+    assert code == 2 and "number = 100000" in err
+    assert (tmp_path / "m" / "modes.csv").read_text() == before

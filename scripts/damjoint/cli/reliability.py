@@ -43,8 +43,7 @@ def add(command: Parser) -> None:
         "--samples",
         0,
         default=500,
-        help="critical levels of the importance sampling, in whole blocks of 50; 0: none "
-        "(default: 500)",
+        help="critical levels of the importance sampling; 0: none (default: 500)",
     )
     command.add_integer("--seed", 0, default=0, help="seed of the random numbers (default: 0)")
     command.add_jobs()

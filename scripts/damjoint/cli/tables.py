@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from .. import InputError
 from .options import Parser
 
 SUMMARY = "write the tables of results for a spreadsheet: a workbook, or CSV with a decimal comma"
@@ -39,6 +40,10 @@ def call(arguments: argparse.Namespace) -> int:
     tables = spreadsheet.tables_of(results)
     beside = results.resolve().with_suffix("") if results.is_file() else results.resolve()
     out = arguments.out or Path(f"{beside}_tables{'' if decimal else '.xlsx'}")
+    if not decimal and out.suffix != ".xlsx":
+        raise InputError(f"out = {out}: must end in .xlsx, or be a folder with --decimal")
+    if decimal and out.resolve() == results.resolve():
+        raise InputError(f"out = {out}: must not be the folder of the results")
     if decimal:
         spreadsheet.write_csv_files(tables, out, decimal)
     else:

@@ -378,7 +378,8 @@ def check_works(case: ParameterValues) -> None:
 def check_steps(steps: int) -> None:
     """Number of steps between two levels."""
     rule = f"be an integer >= 1 and <= {MOST_STEPS}"
-    require(1 <= steps <= MOST_STEPS, "steps", str(steps), rule)
+    whole = isinstance(steps, int) and 1 <= steps <= MOST_STEPS
+    require(whole, "steps", str(steps), rule)
 
 
 def highest_level(case: ParameterValues) -> float:

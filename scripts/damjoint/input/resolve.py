@@ -126,6 +126,7 @@ def loading_lists(
         lists["levels"] = levels_of("levels", source.levels)
     if source.levels is not None or steps is not None:
         lists.pop("times", None)
+    given = source.tail_levels is not None or "tail_levels" in lists
     tails = lists.pop("tail_levels", (0.0,))
     if source.tail_levels is not None:
         tails = levels_of("tail_levels", source.tail_levels)
@@ -134,6 +135,8 @@ def loading_lists(
     if "levels" in lists:
         raise InputError("levels: must not be set with a hydrograph, which has them")
     flood = hydrograph.read(Path(source.text.texts["hydrograph"]))
+    if flood.tail_levels and given:
+        raise InputError("tail_levels: must not be set with a hydrograph that has them")
     return lists | {"levels": flood.levels}, flood.tail_levels or tails, flood.settings
 
 

@@ -14,7 +14,7 @@ from ..input.case import Case
 from ..input.resolve import with_record
 from ..model.results import MODES, joint_columns, quake_columns
 from ..python_words import speaks_python
-from .cases import as_case, noted
+from .cases import as_case, noted, on_fixed_mesh
 from .tables import JointTable, Tables, WithTables, displayed, records, tables_of_run
 
 if TYPE_CHECKING:
@@ -145,7 +145,7 @@ def quake(
     from ..studies import quake_study
 
     chosen = as_case(source)
-    chosen = noted(chosen if record is None else with_record(chosen, record))
+    chosen = on_fixed_mesh(noted(chosen if record is None else with_record(chosen, record)))
     options = quake_study.Options(engine, progress=progress)
     quake_study.check(chosen, options)
     tables = quake_study.compute(chosen, options)
@@ -216,4 +216,4 @@ def modes(source: Case | str | Path = "dam", *, number: int = 5) -> Modes:
 
     if number < 1:
         raise InputError(f"number = {number}: must be an integer >= 1")
-    return Modes(modes_study.compute(noted(as_case(source)), number, progress=False))
+    return Modes(modes_study.compute(on_fixed_mesh(noted(as_case(source))), number, progress=False))

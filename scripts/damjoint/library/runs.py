@@ -24,7 +24,7 @@ from ..statics.hints import hints
 from ..statics.statement import statement
 from ..statics.verdict import verdict
 from ..threads import limited_threads
-from .cases import as_case, noted
+from .cases import as_case, noted, on_fixed_mesh
 from .tables import (
     JointTable,
     Tables,
@@ -218,7 +218,7 @@ def load_steps(source: Case | str | Path) -> Iterator[Step]:
         >>> [step.level for step in load_steps(case("dam", levels=[30, 40], n_joint=10))]
         [30.0, 40.0]
     """
-    case = noted(as_case(source), 3)
+    case = on_fixed_mesh(noted(as_case(source), 3))
     threads = thread_number(case)
     with limited_threads(threads):
         stepper = LoadStepper(case)

@@ -64,8 +64,10 @@ class JointTable(np.recarray):
         toe. Raises InputError if there is no such table.
         """
         column, value = ("level", level) if time is None else ("time", time)
-        if value is None:
-            raise InputError("at: must have a level or a time")
+        if value is None or (level is None) == (time is None):
+            raise InputError("at: must have a level or a time, not both")
+        if not len(self):
+            raise InputError(f"{column} = {value:g}: the table has no rows")
         near = np.isclose(self[column], value, rtol=ROUND_OFF, atol=ROUND_OFF)
         if not near.any():
             known = ", ".join(f"{v:g}" for v in dict.fromkeys(self[column].tolist()))

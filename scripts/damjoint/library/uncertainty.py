@@ -117,7 +117,7 @@ def reliability(
             uncertain.
         correlate: rank correlations, "A,B=R" each.
         tie: parameters computed from the others, such as `{"adhesion": "2e5*mu"}`.
-        samples: critical levels of the importance sampling, in whole blocks of 50; 0: none.
+        samples: critical levels of the importance sampling; 0: none.
         seed: of the random numbers.
         jobs: number of processes (default: one per core).
         distributions: of scipy.stats by parameter, as texts, "normal(0.8,0.1)"; `level` [m]; of one
@@ -186,9 +186,10 @@ def calibrate(
     from ..studies.calibrate_study import compute
     from ..studies.measurements import read
 
-    chosen = noted(as_case(source))
+    chosen = on_fixed_mesh(noted(as_case(source)))
     measurements = read(Path(measured), chosen)
-    return compute(chosen, free_of(chosen, list(free)), measurements, jobs, progress)
+    names = [free] if isinstance(free, str) else list(free)
+    return compute(chosen, free_of(chosen, names), measurements, jobs, progress)
 
 
 @speaks_python

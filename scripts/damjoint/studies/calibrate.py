@@ -21,7 +21,7 @@ from scipy import optimize, stats
 from .. import InputError, RunError
 from ..arrays import Array
 from ..input import parameters
-from ..input.arithmetic import explained, quantity
+from ..input.arithmetic import bare_number, explained, quantity
 from ..input.case import Case
 from ..input.resolve import varied
 from ..processes import as_finished, process_count
@@ -130,6 +130,7 @@ def free(case: Case, name: str, limits: str | None) -> Free:
     text = f"--free {name}" + (f"={limits}" if limits is not None else "")
     if not declared.real:
         raise InputError(f"{text}: must be of a parameter that is a real number")
+    parameters.check_same([joint.values for joint in case.joints], f"--free {name}", name)
     start = float(case[name])
     low, high, prior = declared.minimum, declared.maximum, None
     if limits is not None and "(" in limits:
@@ -157,6 +158,8 @@ def free(case: Case, name: str, limits: str | None) -> Free:
 def limits_of(text: str, limits: str, unit: str) -> tuple[float, float]:
     """The numbers of LOW:HIGH in a unit. Raises InputError."""
     rule = "must be LOW:HIGH, normal(MEAN,SD) or lognorm(S,0,MEDIAN)"
+    if bare := bare_number(limits.split(":")):
+        raise InputError(f"{text}: {bare} must have a unit, as the other has")
     try:
         low, high = (quantity(part, unit) for part in limits.split(":"))
     except ValueError as error:

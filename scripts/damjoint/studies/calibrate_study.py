@@ -41,6 +41,7 @@ def calibrate(
 
     jobs: number of processes. Raises InputError, RunError.
     """
+    measurements.loaded(case)  # checks the levels, before an earlier study is removed
     with session(case, out) as study:
         answer = compute(case, free, measurements, jobs)
         save(study, answer, picture)

@@ -163,7 +163,10 @@ def read(path: Path, case: Case) -> Measurements:
             raise InputError(f"{path}: column {name}: must be given once")
     for number, row in enumerate(rows, 2):
         if len(row) != len(head):
-            raise InputError(f"{path}: row {number}: must have {len(head)} cells, has {len(row)}")
+            rule = f"must have {len(head)} cells, has {len(row)}"
+            if ";" in head[0]:
+                rule = "must have commas between its cells, and decimal points"
+            raise InputError(f"{path}: row {number}: {rule}")
     texts = {name: [row[k].strip() for row in rows] for k, name in enumerate(head)}
     if LEVEL not in texts or not rows:
         raise InputError(f"{path}: must have a column {LEVEL} [m] and a row per reading")
@@ -181,6 +184,9 @@ def read(path: Path, case: Case) -> Measurements:
             first = int(np.flatnonzero(~np.isfinite(levels))[0]) + 2
             raise InputError(f"{path}: row {first}: {name}: must be a level [m]")
     tails = tuple(water[TAIL].tolist()) if TAIL in water else None
+    if tails is None and len(set(case.tail_levels)) > 1:
+        changes = ", ".join(f"{level:g}" for level in case.tail_levels)
+        raise InputError(f"{path}: needs a column {TAIL} [m]; that of the case is {changes}")
     dates = tuple(texts.get(DATE, [""] * len(rows)))
     return Measurements(tuple(water[LEVEL].tolist()), tails, dates, series)
 

@@ -36,9 +36,9 @@ def run(case: Case, number: int, out: Path, picture: bool = True) -> NaturalMode
 
     Raises InputError, RunError.
     """
-    check(case)  # before a folder is written
+    check(case)
+    natural = compute(case, number)  # which checks the number: before an earlier study is removed
     with session(case, out) as study:
-        natural = compute(case, number)
         columns = {name: column.tolist() for name, column in natural.table.items()}
         tables.write_csv(out / ROWS, natural.table)
         if picture:

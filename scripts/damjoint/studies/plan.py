@@ -19,7 +19,6 @@ from ..input import parameters
 from ..input.arithmetic import arithmetic_value, bare_number, explained, quantity
 from ..input.case import Case
 from ..input.resolve import varied, with_record
-from ..progress import track
 
 #: A row of a result file: texts by column.
 Row: TypeAlias = dict[str, str]
@@ -440,7 +439,7 @@ def planned_cases(base: Case, plan: Plan) -> Iterator[tuple[dict[str, Value], Ca
     independent = parameters.independent()
     # Gmsh's parser resolves a case once for all rows that differ in independent parameters only
     resolved: dict[tuple[Value, ...], Case] = {}
-    for row in track(plan.rows(), "values of the rows", plan.number):
+    for row in plan.rows():
         alone = {n: v for n, v in row.items() if n in independent}
         key = tuple(v for n, v in row.items() if n not in alone)
         if key not in resolved:

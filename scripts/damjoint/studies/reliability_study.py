@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from scipy import stats
 from tabulate import tabulate
 
@@ -57,6 +58,8 @@ def reliability(
     check_jobs(jobs)
     search_of(case, "level")  # checks the case
     variables.rank_correlations()
+    medians = variables.values(np.zeros(len(variables.names)))
+    CriticalLevels(case, variables).case_of("", medians)  # checks names, ties and values
     rows, columns = out / ROWS, columns_of(variables)
     keep = of_same_columns(rows, columns)
     with scheduler_client(scheduler) as client, session(case, out, keep) as study:

@@ -169,11 +169,8 @@ def write(folders: list[Path], to: Path, dam: str = "") -> None:
     for folder in folders:
         runs = (run for part in parts_of(folder) for run in stored.runs_in(part))
         paths += [folder] if is_study(folder) else runs
-    inside = any(path.resolve() in to.resolve().parents for path in paths)
-    if to.is_dir() or (inside and to.suffix.lower() not in (".html", ".pdf")):
-        raise InputError(
-            f"to = {to}: must be a file; in the folder of a run it must end in .html or .pdf"
-        )
+    if to.is_dir() or to.suffix.lower() not in (".html", ".pdf"):
+        raise InputError(f"to = {to}: must be a file that ends in .html or .pdf")
     sections = [
         report_studies.read(path, number) if is_study(path) else read_section(path, number)
         for number, path in enumerate(paths, start=1)

@@ -209,7 +209,8 @@ def critical_value(task: Task) -> dict[str, Value]:
 
 def planned(case: Case, plan: Plan) -> Iterator[tuple[str, Values, Task]]:
     """Key, values and task of each row of a plan. Raises InputError."""
-    for row, varied in planned_cases(case, plan):
+    rows = track(planned_cases(case, plan), "values of the rows", plan.number)
+    for row, varied in rows:
         search = partial(search_of, varied, plan.critical) if plan.critical else None
         if plan.quake:
             quake.check(varied)
