@@ -95,7 +95,6 @@ def test_a_parameter_out_of_range_is_refused(refused, setting, allowed):
         (("sweep", "a", "--vary", "mu=1", "--intensity", "arias_x"), ("--intensity: need",)),
         (("sweep", "a", "--vary", "mu=1", "--out", "mu.png"), ("out = mu.png", ".csv")),
         (("sweep", "a", "--vary", "mu=1", "--quake", "slip=5*kN"), ("slip=5*kN", "in m")),
-        (("critical", "lifts", "--of", "adhesion"), ("--of adhesion", "same at all joints")),
         (("sweep", "a", "--vary", "levels=3,6"), ("levels", "no parameter", "--levels")),
         (("run", "a", "--set", "tail_level=3"), ("tail_level", "no parameter", "--tail-levels")),
         (("run", "lifts", "--set", "mu=0.9,90*cm/m,1,1"), ("0.9 must have a unit",)),

@@ -413,15 +413,6 @@ def of_any_joint(name: str) -> Parameter:
     return parameter(name.rpartition(".")[2])
 
 
-def check_same(joints: Sequence[Mapping[str, Any]], setting: str, name: str) -> None:
-    """Raise InputError if a parameter of a setting differs between the joints of a case: with one
-    value for all of them it would be another dam.
-    """
-    if parameter(name).of_joints and len({joint[name] for joint in joints}) > 1:
-        values = ", ".join(f"{joint[name]}" for joint in joints)
-        raise InputError(f"{setting}: must be the same at all joints, is {values}")
-
-
 def settings(pairs: Iterable[str]) -> dict[str, Setting]:
     """{name: checked value} from texts 'name=value', 'name=value,value' with a value for each
     joint, or 'joint.name=value' for one of them.

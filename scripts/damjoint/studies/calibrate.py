@@ -130,7 +130,10 @@ def free(case: Case, name: str, limits: str | None) -> Free:
     text = f"--free {name}" + (f"={limits}" if limits is not None else "")
     if not declared.real:
         raise InputError(f"{text}: must be of a parameter that is a real number")
-    parameters.check_same([joint.values for joint in case.joints], f"--free {name}", name)
+    values = [joint[name] for joint in case.joints]
+    if declared.of_joints and len(set(values)) > 1:  # with one for all it would be another dam
+        listed = ", ".join(map(str, values))
+        raise InputError(f"{text}: must be the same at all joints, is {listed}")
     start = float(case[name])
     low, high, prior = declared.minimum, declared.maximum, None
     if limits is not None and "(" in limits:

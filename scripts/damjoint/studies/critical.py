@@ -19,7 +19,7 @@ from .. import InputError, meant
 from ..arrays import Setting
 from ..engines import check_engine
 from ..input.case import Case
-from ..input.parameters import check_same, declared, independent, parameter
+from ..input.parameters import declared, independent, parameter
 from ..input.resolve import resolve, varied
 from ..joint.interface import interface_of
 from ..model.results import Results, row_of_joint
@@ -153,7 +153,6 @@ class Search:
             return
         if self.name not in declared() and (hint := meant(self.of, OF)):
             raise InputError(f"--of {self.of}: unknown; {hint}")
-        check_same([joint.values for joint in case.joints], f"--of {self.of}", self.name)
         varied = parameter(self.name)
         if not varied.real or varied.group == "Solver":
             raise InputError(
