@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from functools import partial
+from functools import cache, partial
 from typing import Any
 from unittest.mock import patch
 
@@ -96,6 +96,7 @@ class Clock:
         return unknowns, spent, *counts, *shares, self.iterations * factorisation(unknowns)
 
 
+@cache
 def factorisation(unknowns: int) -> float:
     """The seconds that LAPACK takes to solve a dense system, the best of REPETITIONS."""
     matrix = np.eye(unknowns) + np.random.default_rng(0).random((unknowns, unknowns)) / unknowns

@@ -182,9 +182,9 @@ class Parser(argparse.ArgumentParser):
         wide = "print all columns of the tables (default: those that fit the terminal)"
         self.add_argument("--wide", action="store_true", help=wide)
 
-    def add_engine(self, note: str = "") -> None:
-        """Add the choice of the engine; note: what it means for this command."""
-        self.add_argument("--engine", default="auto", metavar="NAME", help=ENGINE + note)
+    def add_engine(self, engines: str = ENGINE) -> None:
+        """Add the choice of the engine; engines: those of this command."""
+        self.add_argument("--engine", default="auto", metavar="NAME", help=engines)
 
     def add_no_picture(self) -> None:
         """Add the option of a run without pictures."""

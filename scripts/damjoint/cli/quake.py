@@ -32,12 +32,9 @@ def add(command: Parser) -> None:
     )
     command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_quake)")
     command.add_jobs()
-    command.add_argument(
-        "--engine",
-        default="auto",
-        metavar="NAME",
-        help="condensed (auto, the default) or getdp (the reference GetDP model: tables only, and "
-        "an interrupted run starts again)",
+    command.add_engine(
+        "condensed (auto, the default) or getdp (the reference GetDP model: tables only, and an "
+        "interrupted run starts again)"
     )
     command.add_argument(
         "--fields",

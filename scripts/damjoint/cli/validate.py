@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .options import Parser, say, table_width
+from .options import ENGINE, Parser, say, table_width
 
 SUMMARY = "compare with the published numbers; exit code 1 if a row fails"
 
@@ -30,7 +30,7 @@ def add(command: Parser) -> None:
     command.add_jobs()
     command.add_wide()
     command.add_engine(
-        ", for cases and paths of a load; tests of a point and of an earthquake: condensed"
+        f"{ENGINE}, for cases and paths of a load; tests of a point and of an earthquake: condensed"
     )
 
 

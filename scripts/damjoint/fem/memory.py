@@ -8,8 +8,6 @@ import resource
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from .. import RunError
 from ..input.case import Case
 from ..progress import INTERVAL, clock
@@ -60,14 +58,12 @@ def bulk_size(case: Case) -> float:
     dam = (case["dam_base"] + case["dam_crest"]) / 2 / crest / min(near / height, 1)
     below = case["dam_base"] / far / min(near / depth, 1)
     beside = 2 * case["found_side"] * depth / far**2 * (1 + max(math.log(far / near), 0))
-    if dim == 2:
-        return float(2 * (dam + below + beside) * order**2)
-    layers = [case["n_layers"]] * 3
-    if case["mesh_pattern"] == "free":  # 1/h^3 integrated over a linear h, over 1/h^2
+    layers = [1.0] * 3 if dim == 2 else [case["n_layers"]] * 3
+    if dim == 3 and case["mesh_pattern"] == "free":  # 1/h^3 over a linear h, over 1/h^2
         shares = (near / crest + 1) / 2, (near / far + 1) / 2, near / far
         layers = [max(1.0, min(share, 1.0) * case["n_layers"]) for share in shares]
-    triangles = 2 * np.dot((dam, below, beside), layers)
-    return float(triangles * order**2 * 4.5)
+    triangles = 2 * (dam * layers[0] + below * layers[1] + beside * layers[2])
+    return float(triangles * order**2 * (1 if dim == 2 else 4.5))
 
 
 def joints_size(case: Case) -> int:

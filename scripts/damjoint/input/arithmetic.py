@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import math
 import operator
 import re
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 
-from .. import data, meant
+from .. import InputError, data, meant
 from ..units import with_slash
 
 BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
@@ -208,20 +209,20 @@ def value_of(node: ast.expr, known: Mapping[str, float]) -> float:
     return number
 
 
-def bare_number(texts: Iterable[str]) -> str:
-    """The first number without a unit in a list of which another one has a unit that is not of the
-    SI, as MPa; empty if there is none. Zero needs no unit.
+def check_units(setting: str, texts: Sequence[str]) -> None:
+    """Raise InputError if a number in a list has no unit and another one a unit that is not of the
+    SI, as MPa. Zero needs none, and texts that are no arithmetic do not count.
     """
-    scaled, bare = False, list[str]()
-    for text in texts:
-        try:
-            names = {part.id for part in ast.walk(parsed(text)) if isinstance(part, ast.Name)}
+    scaled, plain = False, list[str]()
+    for text in texts if len(texts) > 1 else ():
+        with contextlib.suppress(ValueError):
+            node = parsed(text)
+            names = {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
             scaled |= any(units().get(name, 1.0) != 1.0 for name in names)
-            if not names and value_of(parsed(text), {}):
-                bare.append(text.strip())
-        except ValueError:  # no arithmetic
-            continue
-    return bare[0] if scaled and bare else ""
+            if not names and value_of(node, {}):
+                plain.append(text.strip())
+    if scaled and plain:
+        raise InputError(f"{setting}: {plain[0]} must have a unit, as the others have")
 
 
 def arguments_of(text: str) -> tuple[list[str], dict[str, str]]:

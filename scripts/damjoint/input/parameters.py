@@ -21,7 +21,7 @@ from .. import InputError, __version__, data, meant
 from ..arrays import Setting, Value
 from ..laws import LAWS
 from ..storage import atomic_write, cached
-from .arithmetic import bare_number, explained, quantity
+from .arithmetic import check_units, explained, quantity
 
 DECLARATIONS = data("pro") / "parameters.pro"
 #: The line by which a text includes the declarations.
@@ -425,8 +425,7 @@ def settings(pairs: Iterable[str]) -> dict[str, Setting]:
         if not equals:
             raise InputError(f"--set {pair}: must be NAME=VALUE")
         listed = value.split(",")
-        if bare := bare_number(listed):
-            raise InputError(f"--set {pair}: {bare} must have a unit, as the others have")
+        check_units(f"--set {pair}", listed)
         values[name] = checked(name, listed if "," in value else value)
     return values
 

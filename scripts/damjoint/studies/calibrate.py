@@ -21,7 +21,7 @@ from scipy import optimize, stats
 from .. import InputError, RunError
 from ..arrays import Array
 from ..input import parameters
-from ..input.arithmetic import bare_number, explained, quantity
+from ..input.arithmetic import check_units, explained, quantity
 from ..input.case import Case
 from ..input.resolve import varied
 from ..processes import as_finished, process_count
@@ -161,8 +161,7 @@ def free(case: Case, name: str, limits: str | None) -> Free:
 def limits_of(text: str, limits: str, unit: str) -> tuple[float, float]:
     """The numbers of LOW:HIGH in a unit. Raises InputError."""
     rule = "must be LOW:HIGH, normal(MEAN,SD) or lognorm(S,0,MEDIAN)"
-    if bare := bare_number(limits.split(":")):
-        raise InputError(f"{text}: {bare} must have a unit, as the other has")
+    check_units(text, limits.split(":"))
     try:
         low, high = (quantity(part, unit) for part in limits.split(":"))
     except ValueError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +17,7 @@ import numpy as np
 from .. import InputError
 from ..arrays import Array, Settings, Value, Values
 from ..input import parameters
-from ..input.arithmetic import arithmetic_value, bare_number, explained, quantity
+from ..input.arithmetic import arithmetic_value, check_units, explained, quantity
 from ..input.case import Case
 from ..input.resolve import varied, with_record
 
@@ -161,9 +162,8 @@ def values_of(text: str) -> tuple[str, list[Value]]:
     bad = InputError(f"{setting}: {rule}")
     if not equals or not values:
         raise bad
-    name, parts = name.strip(), re.split("[,:]", values)
-    if bare := bare_number(parts):
-        raise InputError(f"{setting}: {bare} must have a unit, as the others have")
+    name = name.strip()
+    check_units(setting, re.split("[,:]", values))
     if ":" not in values:
         return name, [checked(name, v.strip()) for v in values.split(",")]
     try:
@@ -402,10 +402,10 @@ def plan_with(
                 "as well"
             )
     for name, values in axes:
-        for index, value in enumerate(values):
-            if value in values[:index]:
-                option = "--record" if name == MOTION else f"--vary {name}"
-                raise InputError(f"{option}: {value} must be given once")
+        value, times = Counter(values).most_common(1)[0]
+        if times > 1:
+            option = "--record" if name == MOTION else f"--vary {name}"
+            raise InputError(f"{option}: {value} must be given once")
     if not (axes or sample or signs):
         raise InputError("--vary, --sample: one must be given, such as --vary mu=0.3:0.8:0.05")
     number = math.prod(len(values) for _, values in axes) * (sample.rows if sample else 1)

@@ -26,8 +26,7 @@ from ..pictures import run_picture
 from ..pictures.drawing import figure_of, picture_style
 from ..pictures.report_picture import Picture, bands, embedded
 from ..post import stored
-from ..post.folder import CHECK as CHECK_FILE
-from ..post.folder import RECORDS, read_info
+from ..post.folder import HEADS, read_info
 from ..post.summary import Table, formatted_table, joints_note, joints_table, levels_table
 from ..post.validation import shown_time
 from ..statics.gravity import GravityMethod
@@ -273,13 +272,12 @@ def parts_of(folder: Path) -> list[Path]:
 
     Raises InputError if its table is damaged.
     """
-    tables = {folder / CHECK_FILE: "case", folder / RECORDS: "folder"}
-    table = next(filter(Path.is_file, tables), None)
+    table = next(filter(Path.is_file, (folder / name for name in HEADS)), None)
     if table is None:
         return [folder]
     try:
         with table.open(newline="", encoding="utf-8") as file:
-            names = dict.fromkeys(row[tables[table]] for row in csv.DictReader(file))
+            names = dict.fromkeys(row[HEADS[table.name][0]] for row in csv.DictReader(file))
     except (*stored.DAMAGED, csv.Error) as error:
         raise InputError(f"out = {folder}: its {table.name} is damaged ({error!r})") from None
     if not all(name and is_name(name) for name in names):

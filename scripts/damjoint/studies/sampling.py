@@ -10,7 +10,7 @@ from scipy import linalg, stats
 
 from .. import InputError
 from ..arrays import Array, IntArray
-from ..input.arithmetic import arguments_of, bare_number, explained, parsed_call
+from ..input.arithmetic import arguments_of, check_units, explained, parsed_call
 
 #: Distributions by scipy's names, and `normal`.
 DISTRIBUTIONS = {
@@ -50,9 +50,8 @@ def distribution(
         raise InputError(f"{message}; {kind} is none; known: {known}")
     shapes = [*filter(None, (DISTRIBUTIONS[kind].shapes or "").split(", "))]
     listed, texts = arguments_of(text)
-    places = [*listed[len(shapes) :], *(texts[n] for n in ("loc", "scale") if n in texts)]
-    if bare := bare_number(places):
-        raise InputError(f"{setting}: {bare} must have a unit, as the other has")
+    further = [texts[name] for name in ("loc", "scale") if name in texts]
+    check_units(setting, [*listed[len(shapes) :], *further])
     arguments = ", ".join([*shapes, "loc", "scale"])
     try:
         with np.errstate(all="ignore"):
