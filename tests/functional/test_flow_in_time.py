@@ -448,13 +448,13 @@ def test_a_sealed_joint_must_store_water(blocks, tmp_path, capsys):
         blocks(uplift, (5.0,), three, joints)
     values = "uplift=none", "middle base.uplift=flow", "time_unit=60", "order=1"
     given = [str(tmp_path / "own.case"), *(w for value in values for w in ("--set", value))]
-    studies = (
-        ["modes"],
-        ["sweep", "--vary", "mu=0.8,1"],
-        ["reliability", "--vary", "mu=normal(1,0.1)"],
-    )
-    for study in studies:
-        out = tmp_path / "out"
+    studies = {
+        "modes": ["modes"],
+        "rows.csv": ["sweep", "--vary", "mu=0.8,1"],
+        "reliability": ["reliability", "--vary", "mu=normal(1,0.1)"],
+    }
+    for name, study in studies.items():
+        out = tmp_path / name
         assert cli.main([*study, *given, "--levels", "5", "--out", str(out)]) == 2
         assert "storage = 0: must be > 0 in joints" in capsys.readouterr().err
         assert not out.exists()
