@@ -206,6 +206,23 @@ def test_what_the_measurements_do_not_determine_is_named(tmp_path, command):
     assert_allclose(answer.deviations, [0.3], rtol=1e-3)
 
 
+@pytest.mark.heavy
+def test_the_stiffness_of_one_lift_is_found_and_stored(tmp_path):
+    soft = {"lift_heights": [12, 25], "law": "friction", "lift 25 m.K_N": 2e10, **COARSE}
+    dam = dj.case("dam", **soft)
+    file = write(measured(dam, instruments(6, crest_ux=1e-5)), tmp_path / "m.csv")
+    first = dj.case(dam, **{"lift 25 m.K_N": 1e11})
+    answer = dj.calibrate(first, file, ["lift 25 m.K_N"], jobs=1)
+    assert_allclose(answer.estimates, [2e10], rtol=1e-6)
+    assert answer.case.joints[2]["K_N"] == answer.estimates[0]
+    assert answer.case.joints[0]["K_N"] == first.joints[0]["K_N"]
+    with pytest.raises(dj.InputError, match="K_N: differs between the joints; must be of one"):
+        dj.calibrate(dam, file, ["K_N"], jobs=1)
+    for name, message in (("lift 26 m.K_N", "must be of a joint: base"), ("base.E", "whole dam")):
+        with pytest.raises(dj.InputError, match=message):
+            dj.calibrate(first, file, [name], jobs=1)
+
+
 def test_fewer_values_than_parameters_determine_none_of_them():
     """One value of two parameters that both act; two values, one of each, determine both."""
     assert np.isinf(np.diag(inverse(np.array([[2.0, 1.0]])))).all()

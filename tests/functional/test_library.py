@@ -445,6 +445,12 @@ def test_a_check_of_a_single_case():
     assert alone.rows[0]["SSF"] == listed.rows[0]["SSF"]
     with pytest.raises(dj.InputError, match="case no: unknown"):  # not those of its letters
         dj.check("no")
+    with pytest.raises(dj.InputError, match="cases: must be at least one"):
+        dj.check([])
+    with pytest.raises(
+        dj.InputError, match="must be a case, or its name or path; it is of type list"
+    ):
+        dj.run([case])
 
 
 @pytest.mark.parametrize(

@@ -31,9 +31,9 @@ def add(command: Parser) -> None:
     command.add_list(
         "--free",
         "NAMES",
-        help="parameters that are searched, from the values of the case: K_N,E_found; or one with "
-        "limits, NAME=LOW:HIGH, or a prior, NAME=normal(MEAN,SD) or lognorm(S,0,MEDIAN) "
-        "(repeatable)",
+        help="parameters that are searched, from the values of the case: K_N,E_found, of one joint "
+        "JOINT.NAME; or one with limits, NAME=LOW:HIGH, or a prior, NAME=normal(MEAN,SD) or "
+        "lognorm(S,0,MEDIAN) (repeatable)",
     )
     command.add_jobs()
     command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_calibrated)")

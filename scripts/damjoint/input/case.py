@@ -26,7 +26,7 @@ from .constraints import (
     highest_level,
 )
 from .joint_graph import ROCK, JointGraph
-from .parameters import GEOMETRY_LISTS, constants, declared, independent
+from .parameters import GEOMETRY_LISTS, constants, declared, independent, of_one_joint
 from .source import Source
 from .values import ParameterValues, flows_in_time, level_unknown, listed
 from .values import flows as flows
@@ -225,6 +225,26 @@ class Case(ParameterValues):
             for joint in self.of_joints
         )
         return replace(self, values={**self.values, **values}, of_joints=others)
+
+    def single_value(self, name: str, given: str) -> Value:
+        """The value of a parameter, the same for all joints, or of one joint, "lift 25 m.mu";
+        given: how it was given, for the message.
+
+        Raises InputError if there is no such joint, or the parameter is of the whole dam, or, of
+        all joints, differs between them.
+        """
+        joint, _, of_joint = name.rpartition(".")
+        names = self.joint_names
+        if joint and joint not in names:
+            raise InputError(f"{given}: must be of a joint: {', '.join(names)}")
+        values = dict(zip(names, (one[of_joint] for one in self.joints), strict=True))
+        if joint:
+            return of_one_joint(name, values[joint])[2]
+        if len(set(values.values())) > 1:
+            raise InputError(
+                f"{given}: differs between the joints; must be of one: {names[0]}.{of_joint}"
+            )
+        return self[of_joint]
 
     def with_value(self, name: str, value: Value) -> Case:
         """The case with another value of a parameter, or of that of one joint, "lift 25 m.mu";

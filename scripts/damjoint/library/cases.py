@@ -61,8 +61,11 @@ def case(
     loading = as_list(levels), as_list(tail_levels), steps, accuracy
     if isinstance(source, Case):
         result = varied(source, parameters, *loading)
-    else:
+    elif isinstance(source, str | Path):
         result = load(str(source), parameters, *loading)
+    else:
+        kind = type(source).__name__
+        raise InputError(f"case: must be a case, or its name or path; it is of type {kind}")
     if name is not None and not is_name(name):
         raise InputError(f"name = {name!r}: must be a text that can be the name of a file")
     if record is not None:

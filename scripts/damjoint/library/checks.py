@@ -109,6 +109,8 @@ def check(cases: Case | str | Path | Sequence[Case | str | Path]) -> Checks:
 
     listed = [cases] if isinstance(cases, Case | str | Path) else cases
     combinations = [as_case(combination) for combination in listed]
+    if not combinations:
+        raise InputError("cases: must be at least one")
     for combination in combinations:
         noted(combination)
     outcomes = [outcome for one in combinations for outcome in runner.compute_scenes(one)]

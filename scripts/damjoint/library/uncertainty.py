@@ -163,8 +163,8 @@ def calibrate(
         measured: CSV with a row per reading: level [m], if wanted tail_level and date, and of each
             instrument a column of history.csv, or head_S, the piezometric head [m] S m from the
             heel, with its standard deviations in NAME_sd; SI units.
-        free: parameters, each as "K_N", with limits "K_N=1e9:1e12" or with a prior
-            "mu=normal(0.8,0.1)"; they start at the values of the case.
+        free: parameters, each as "K_N", of one joint "base.K_N", with limits "K_N=1e9:1e12" or
+            with a prior "mu=normal(0.8,0.1)"; they start at the values of the case.
         jobs: number of processes (default: one per core).
         progress: show a bar, or where there is no terminal a line every ten seconds.
 

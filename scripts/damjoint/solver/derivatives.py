@@ -119,22 +119,14 @@ def half_difference(case: Case, name: str) -> tuple[float, float, float]:
 
     Raises InputError if a parameter has no derivative.
     """
-    joint, _, of_joint = name.rpartition(".")
+    of_joint = name.rpartition(".")[2]
     known = parameter(of_joint)
     if not known.real or known.group in NOT_CONTINUOUS or of_joint in TIMES:
         raise InputError(
             f"--sensitivity {name}: must be a parameter that is a number, and neither of geometry, "
             f"mesh nor solver, nor {', '.join(TIMES)}"
         )
-    names = list(case.joint_names)
-    if joint and joint not in names:
-        raise InputError(f"--sensitivity {name}: must be of a joint: {', '.join(names)}")
-    if not joint and known.of_joints and len({j[of_joint] for j in case.joints}) > 1:
-        raise InputError(
-            f"--sensitivity {name}: differs between the joints; must be of one: "
-            f"{names[0]}.{of_joint}"
-        )
-    value = float(case.joints[names.index(joint) if joint else 0][of_joint])
+    value = float(case.single_value(name, f"--sensitivity {name}"))
     half = DIFFERENCE * abs(value) or half_of_zero(case, known.unit)
     low, high = value - half, value + half
     low, high = (end if known.allows(end) else value for end in (low, high))

@@ -108,7 +108,7 @@ class Free:
 
 def free_of(case: Case, texts: Sequence[str]) -> list[Free]:
     """The free parameters of NAME,NAME, NAME=LOW:HIGH or NAME=normal(MEAN,SD) and
-    NAME=lognorm(S,0,MEDIAN), which start at the case's values.
+    NAME=lognorm(S,0,MEDIAN), which start at the case's values; JOINT.NAME: of one joint.
 
     Raises InputError.
     """
@@ -126,15 +126,11 @@ def free_of(case: Case, texts: Sequence[str]) -> list[Free]:
 
 def free(case: Case, name: str, limits: str | None) -> Free:
     """A free parameter; limits: LOW:HIGH, a prior, or None. Raises InputError."""
-    declared = parameters.parameter(name)
+    declared = parameters.of_any_joint(name)
     text = f"--free {name}" + (f"={limits}" if limits is not None else "")
     if not declared.real:
         raise InputError(f"{text}: must be of a parameter that is a real number")
-    values = [joint[name] for joint in case.joints]
-    if declared.of_joints and len(set(values)) > 1:  # with one for all it would be another dam
-        listed = ", ".join(map(str, values))
-        raise InputError(f"{text}: must be the same at all joints, is {listed}")
-    start = float(case[name])
+    start = float(case.single_value(name, text))  # with one for all it would be another dam
     low, high, prior = declared.minimum, declared.maximum, None
     if limits is not None and "(" in limits:
         prior = parsed_prior(text, name, limits)
@@ -175,7 +171,7 @@ def parsed_prior(text: str, name: str, words: str) -> tuple[float, float, bool]:
     """Mean and standard deviation of a normal prior; of a lognormal one those of the logarithm, and
     True. Raises InputError.
     """
-    frozen = sampling.distribution(name, words, "--free", parameters.parameter(name).unit)
+    frozen = sampling.distribution(name, words, "--free", parameters.of_any_joint(name).unit)
     kind = words.partition("(")[0].strip()
     if kind in ("normal", "norm"):
         return float(frozen.mean()), float(frozen.std()), False

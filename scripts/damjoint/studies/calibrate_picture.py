@@ -56,7 +56,7 @@ def figure(answer: Calibration) -> Figure:
 def estimate_words(answer: Calibration, number: int) -> str:
     """An estimate with its interval."""
     one, (low, high) = answer.free[number], answer.intervals[number]
-    unit = with_slash(parameters.parameter(one.name).unit)
+    unit = with_slash(parameters.of_any_joint(one.name).unit)
     text = f"{one.name} = {answer.estimates[number]:.4g} {unit} ({low:.4g} to {high:.4g})"
     return text + (", not determined" if one.name in answer.undetermined else "")
 

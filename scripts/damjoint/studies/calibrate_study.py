@@ -93,7 +93,7 @@ def estimates_table(answer: Calibration) -> dict[str, Column]:
     names = [one.name for one in answer.free]
     table: dict[str, Column] = {
         "parameter": names,
-        "unit": [parameters.parameter(name).unit for name in names],
+        "unit": [parameters.of_any_joint(name).unit for name in names],
         "start": np.array([one.start for one in answer.free]),
         "estimate": answer.estimates,
         "low": answer.intervals[:, 0],
@@ -181,7 +181,7 @@ def estimates_text(answer: Calibration) -> str:
     rows: list[tuple[str, ...]] = [
         (
             one.name,
-            with_slash(parameters.parameter(one.name).unit),
+            with_slash(parameters.of_any_joint(one.name).unit),
             f"{one.start:.4g}",
             f"{estimate:.4g}",
             f"{low:.4g} to {high:.4g}",
