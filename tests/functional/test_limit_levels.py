@@ -1,11 +1,11 @@
-"""Critical levels of random dams in four ways."""
+"""Critical levels of random dams in several ways."""
 
 import pytest
 from damjoint_tools.limit_levels import WAYS, limit_levels, spread, summary
 
 
 @pytest.mark.heavy
-def test_four_ways_lead_to_the_same_level_and_a_file_is_continued(tmp_path):
+def test_all_ways_lead_to_the_same_level_and_a_file_is_continued(tmp_path):
     (row,) = limit_levels(1, 3, tmp_path / "limits.csv", jobs=1)
     assert row["law"] == "bond"
     assert all(row[f"confirmed_{way}"] == "1" for way in range(len(WAYS)))
@@ -24,14 +24,14 @@ def row_of(law, *levels):
 
 def test_levels_that_differ_or_are_not_confirmed_are_listed():
     rows = [
-        row_of("bond", 30, 30, 30, 30.01),
-        row_of("endo", 20, 0, -20, 20),
-        row_of("endo", *4 * [0]),
+        row_of("bond", 30, 30, 30, 30.01, 30),
+        row_of("endo", 20, 0, -20, 20, 20),
+        row_of("endo", *5 * [0]),
     ]
     _, bond, endo, *dams = summary(rows)
-    assert bond.split()[:6] == ["bond", "1", "0", "of", "4", "0.0%"] and "3.3e-04" in bond
-    assert endo.split()[:6] == ["endo", "2", "2", "of", "8", "25.0%"] and "0.0e+00" in endo
+    assert bond.split()[:6] == ["bond", "1", "0", "of", "5", "0.0%"] and "3.3e-04" in bond
+    assert endo.split()[:6] == ["endo", "2", "2", "of", "10", "20.0%"] and "0.0e+00" in endo
     assert dams == [
-        "1-0 bond none: 30, 30, 30, 30.01",
-        "1-0 endo none: 20, no limit not confirmed, 20 not confirmed, 20",
+        "1-0 bond none: 30, 30, 30, 30.01, 30",
+        "1-0 endo none: 20, no limit not confirmed, 20 not confirmed, 20, 20",
     ]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -46,27 +47,24 @@ def read(path: Path) -> Hydrograph:
     """Read a hydrograph. Raises InputError."""
     name = f"hydrograph = {path}"
     text = read_limited_text(path, name, LONGEST)
-    lines = [line for line in csv.reader(text.splitlines()) if line]
+    reader = csv.reader(text.splitlines())
+    numbered = [(reader.line_num, line) for line in reader if line]
+    numbers, lines = [number for number, _ in numbered], [line for _, line in numbered]
     head = [cell.strip() for cell in lines[0]] if lines else []
     if not head or head[0] not in SECONDS or head[1:] not in HEADS:
         raise InputError(
             f"{name}: its first row must be hours,level or hours,level,tail_level (or seconds, "
             "days; levels in m)"
         )
-    try:
-        rows = np.array([[float(cell) for cell in line] for line in lines[1:]])
-    except ValueError:
-        raise InputError(f"{name}: must have numbers in each row, as many as columns") from None
-    if rows.shape[:1] < (2,) or rows.shape[1:] != (len(head),) or not np.isfinite(rows).all():
-        raise InputError(
-            f"{name}: must have finite numbers in two rows or more, as many as columns"
-        )
+    rows = np.array([finite_numbers(f"{name}, row {k}", n, head) for k, n in numbered[1:]])
+    if len(rows) < 2:
+        raise InputError(f"{name}: must have two rows of numbers or more")
     times = (rows[:, 0] - rows[0, 0]) * SECONDS[head[0]]
-    for row, (before, after) in enumerate(pairwise(times), 3):
+    for k, (before, after) in enumerate(pairwise(times), 1):
         if not after > before:
             raise InputError(
-                f"{name}, row {row}: {head[0]} = {rows[row - 2, 0]:g}: must be later than the row "
-                "before"
+                f"{name}, row {numbers[k + 1]}: {head[0]} = {rows[k, 0]:g}: must be later than the "
+                "row before"
             )
     unit = float(np.diff(times).min())
     number = math.ceil(times[-1] / unit * (1 - ROUND_OFF)) + 1
@@ -77,3 +75,14 @@ def read(path: Path) -> Hydrograph:
     at = np.minimum(unit * np.arange(number), times[-1])
     columns = [tuple(np.interp(at, times, column).tolist()) for column in rows[:, 1:].T]
     return Hydrograph(unit, columns[0], columns[1] if len(columns) > 1 else None)
+
+
+def finite_numbers(where: str, line: Sequence[str], head: Sequence[str]) -> list[float]:
+    """The numbers of a row, one for each column. Raises InputError."""
+    try:
+        values = [float(cell) for cell in line]
+    except ValueError:
+        values = []
+    if len(values) != len(head) or not all(map(math.isfinite, values)):
+        raise InputError(f"{where}: {','.join(line)}: must be {len(head)} finite numbers")
+    return values

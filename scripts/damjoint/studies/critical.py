@@ -76,6 +76,9 @@ GROWTH = "unstable crack growth"
 #: What is said of a level at which a crack grows unstably on all paths, which some of them pass.
 PASSED = "there the crack grows unstably, on all paths to the same level; some pass it"
 
+#: What is said of it where all of them pass it.
+PASSED_BY_ALL = "there the crack grows unstably, on all paths at the same level; they pass it"
+
 #: Relative distance within which the bound of statics confirms a critical level below it.
 NEAR_BOUND = 0.02
 
@@ -353,11 +356,29 @@ class Search:
         if path.water_withdraws:
             result = self.where_water_withdraws(path, result)
         if not path.passed_to > path.highest:
-            return result
+            return self.at_passed_growth(path, result) if result.confirmed else result
         result = replace(result, mode=GROWTH, why=PASSED, doubt="")
         highest = float(max(path.passed_to, result.stands_at or 0.0))
         after = {"by other increments": highest}
         return replace(result, growth=float(path.highest), stands_at=None, after=after)
+
+    def at_passed_growth(self, path: FailurePath, result: CriticalValue) -> CriticalValue:
+        """A result at the unstable growth that its path and all others have passed, below their
+        highest level: rounding decides whether a path is led over it or ends there. The result
+        itself if one of them has passed none.
+        """
+        growths = path.growth_of_all if path.passes_growth else None
+        if growths is None:
+            varies = path.differs_after_growth
+            return replace(result, why="", doubt=by_increments(path)) if varies else result
+        end = path.up_to(path.branches_with_less_tension[0] - 1)
+        end.interval = low, high = growths
+        result = self.result(end.highest, end, end.points[end.top])
+        after = {"by displacement": float(path.highest)}
+        result = replace(result, mode=GROWTH, growth=end.highest, after=after)
+        if high - low > PRECISION * high:
+            return replace(result, why="", doubt=by_increments(end))
+        return replace(result, why=PASSED_BY_ALL, doubt="")
 
     def where_water_withdraws(self, path: FailurePath, result: CriticalValue) -> CriticalValue:
         """A result above which the water withdraws from the crack, and to which other ways lead:

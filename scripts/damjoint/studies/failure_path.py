@@ -143,6 +143,11 @@ class FailurePath(EquilibriumPath):
         #: the highest level [m] of other paths that pass the unstable growth at its own highest
         #: one; -inf: none
         self.passed_to = -np.inf
+        #: the growth [m] that each other path has passed, if this one has, see `passed_growth`;
+        #: None: none
+        self.other_growths: list[float | None] = []
+        #: whether one of them has another highest level
+        self.differs_after_growth = False
         #: the runs from the beginning, by the level to which they were to lead
         self.runs: dict[float, LoadStepper] = known.runs if known else {}
         #: the part of a joint that may open or soften before a displacement is prescribed
@@ -672,13 +677,22 @@ class FailurePath(EquilibriumPath):
     def widen(self, other: EquilibriumPath, precision: float) -> bool:
         """See `EquilibriumPath.widen`. Where water enters the crack of a joint that softens, a path
         may pass the unstable growth at the highest level of another one, and reach a higher level:
-        they agree on the growth, and the lower path is the one to follow.
+        they agree on the growth, and the lower path is the one to follow. They agree on it, too, if
+        they pass the same growth, and reach different levels.
         """
         assert isinstance(other, FailurePath)
+        growth = self.passed_growth
+        if growth is not None:
+            found = growth if other.grows_at(growth) else other.passed_growth
+            self.other_growths = [*self.other_growths, found]
         low, high = (self, other) if self.highest < other.highest else (other, self)
         apart = high.highest > (1 + precision) * low.highest
         if not (apart and self.passes_growth and not low.slides and high.grows_at(low.highest)):
-            return super().widen(other, precision)
+            differs = super().widen(other, precision)
+            if not (differs and growth is not None and self.other_growths[-1] == growth):
+                return differs
+            self.differs_after_growth = True
+            return False
         low.passed_to = max(low.passed_to, high.highest, high.passed_to)
         return self is high
 
@@ -699,6 +713,15 @@ class FailurePath(EquilibriumPath):
         """
         numbers = self.branches_with_less_tension
         return self.points[numbers[0] - 1].level if numbers else None
+
+    @property
+    def growth_of_all(self) -> tuple[float, float] | None:
+        """The lowest and the highest growth [m] that this path and all others have passed; None if
+        one of them has passed none, or there are no others.
+        """
+        growths = [self.passed_growth, *self.other_growths]
+        passed = [growth for growth in growths if growth is not None]
+        return (min(passed), max(passed)) if len(passed) == len(growths) > 1 else None
 
     # -- refinement of its end
     # ----------------------------------------------------------------------------------------------

@@ -152,16 +152,18 @@ def read(path: Path, case: Case) -> Measurements:
     """
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            head, *rows = [row for row in csv.reader(file) if row]
+            reader = csv.reader(file)
+            numbered = [(reader.line_num, row) for row in reader if row]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: can not be read ({error})") from None
-    except ValueError:
-        raise InputError(f"{path}: must have a row of column names and a row per reading") from None
+    if not numbered:
+        raise InputError(f"{path}: must have a row of column names and a row per reading")
+    lines, (head, *rows) = [number for number, _ in numbered[1:]], [row for _, row in numbered]
     head = [name.strip() for name in head]
     for name in head:
         if head.count(name) > 1:
             raise InputError(f"{path}: column {name}: must be given once")
-    for number, row in enumerate(rows, 2):
+    for number, row in zip(lines, rows, strict=True):
         if len(row) != len(head):
             rule = f"must have {len(head)} cells, has {len(row)}"
             if ";" in head[0]:
@@ -177,11 +179,12 @@ def read(path: Path, case: Case) -> Measurements:
             raise InputError(f"{path}: column {name}: has no column {name.removesuffix(DEVIATION)}")
     if not measured:
         raise InputError(f"{path}: must have a measured column, such as crest_ux with crest_ux_sd")
-    series = tuple(measured_series(path, case, name, texts) for name in measured)
-    water = {name: values_of(path, name, texts[name]) for name in (LEVEL, TAIL) if name in texts}
+    columns = TextColumns(path, lines, texts)
+    series = tuple(measured_series(columns, case, name) for name in measured)
+    water = {name: columns.values(name) for name in (LEVEL, TAIL) if name in texts}
     for name, levels in water.items():
         if not np.isfinite(levels).all():
-            first = int(np.flatnonzero(~np.isfinite(levels))[0]) + 2
+            first = lines[int(np.flatnonzero(~np.isfinite(levels))[0])]
             raise InputError(f"{path}: row {first}: {name}: must be a level [m]")
     tails = tuple(water[TAIL].tolist()) if TAIL in water else None
     if tails is None and len(set(case.tail_levels)) > 1:
@@ -191,37 +194,46 @@ def read(path: Path, case: Case) -> Measurements:
     return Measurements(tuple(water[LEVEL].tolist()), tails, dates, series)
 
 
-def values_of(path: Path, name: str, texts: Sequence[str]) -> Array:
-    """The numbers of a column, nan where a cell is empty. Raises InputError."""
-    values = np.full(len(texts), np.nan)
-    for k, text in enumerate(texts):
-        try:
-            values[k] = float(text) if text else np.nan
-        except ValueError:
-            values[k] = np.inf
-        if np.isinf(values[k]):
-            raise InputError(f"{path}: row {k + 2}: {name} = {text}: must be a number, or empty")
-    return values
+@dataclass(frozen=True)
+class TextColumns:
+    """The cells of a file's columns as texts, and the numbers of their rows."""
+
+    path: Path
+    rows: Sequence[int]
+    texts: Mapping[str, Sequence[str]]
+
+    def values(self, name: str) -> Array:
+        """The numbers of a column, nan where a cell is empty. Raises InputError."""
+        values = np.full(len(self.rows), np.nan)
+        for k, text in enumerate(self.texts[name]):
+            try:
+                values[k] = float(text) if text else np.nan
+            except ValueError:
+                values[k] = np.inf
+            if np.isinf(values[k]):
+                where = f"{self.path}: row {self.rows[k]}"
+                raise InputError(f"{where}: {name} = {text}: must be a number, or empty")
+        return values
 
 
-def measured_series(path: Path, case: Case, name: str, texts: dict[str, list[str]]) -> Series:
+def measured_series(columns: TextColumns, case: Case, name: str) -> Series:
     """The measurements of a column and of its standard deviations. Raises InputError."""
-    columns = {n: c for n, c in history_columns(case).items() if n not in NOT_MEASURED}
-    bad = f"{path}: column {name}:"
+    known = {n: c for n, c in history_columns(case).items() if n not in NOT_MEASURED}
+    bad = f"{columns.path}: column {name}:"
     joint, position, unit = 0, None, "m"
     if name.startswith(HEAD):
         joint, position = piezometer(bad, case, name)
-    elif name in columns:
-        unit = columns[name][0]
+    elif name in known:
+        unit = known[name][0]
     else:
-        raise InputError(f"{bad} must be one of {', '.join(columns)}, or {HEAD}S")
-    if name + DEVIATION not in texts:
+        raise InputError(f"{bad} must be one of {', '.join(known)}, or {HEAD}S")
+    if name + DEVIATION not in columns.texts:
         raise InputError(f"{bad} needs its standard deviations, column {name}{DEVIATION}")
-    measured = values_of(path, name, texts[name])
-    deviation = values_of(path, name + DEVIATION, texts[name + DEVIATION])
+    measured, deviation = columns.values(name), columns.values(name + DEVIATION)
     wrong = np.flatnonzero(np.isfinite(measured) & ~(deviation > 0))
     if len(wrong):
-        raise InputError(f"{path}: row {wrong[0] + 2}: {name}{DEVIATION}: must be > 0")
+        row = columns.rows[int(wrong[0])]
+        raise InputError(f"{columns.path}: row {row}: {name}{DEVIATION}: must be > 0")
     if not np.isfinite(measured).any():
         raise InputError(f"{bad} must have a measured value")
     return Series(name, unit, measured, deviation, joint, position)
