@@ -49,21 +49,20 @@ def read(path: Path) -> Hydrograph:
     text = read_limited_text(path, name, LONGEST)
     reader = csv.reader(text.splitlines())
     numbered = [(reader.line_num, line) for line in reader if line]
-    numbers, lines = [number for number, _ in numbered], [line for _, line in numbered]
-    head = [cell.strip() for cell in lines[0]] if lines else []
+    head = [cell.strip() for cell in numbered.pop(0)[1]] if numbered else []
     if not head or head[0] not in SECONDS or head[1:] not in HEADS:
         raise InputError(
             f"{name}: its first row must be hours,level or hours,level,tail_level (or seconds, "
             "days; levels in m)"
         )
-    rows = np.array([finite_numbers(f"{name}, row {k}", n, head) for k, n in numbered[1:]])
+    rows = np.array([finite_numbers(f"{name}, row {k}", line, head) for k, line in numbered])
     if len(rows) < 2:
         raise InputError(f"{name}: must have two rows of numbers or more")
     times = (rows[:, 0] - rows[0, 0]) * SECONDS[head[0]]
     for k, (before, after) in enumerate(pairwise(times), 1):
         if not after > before:
             raise InputError(
-                f"{name}, row {numbers[k + 1]}: {head[0]} = {rows[k, 0]:g}: must be later than the "
+                f"{name}, row {numbered[k][0]}: {head[0]} = {rows[k, 0]:g}: must be later than the "
                 "row before"
             )
     unit = float(np.diff(times).min())

@@ -682,17 +682,16 @@ class FailurePath(EquilibriumPath):
         """
         assert isinstance(other, FailurePath)
         growth = self.passed_growth
+        same = growth is not None and other.grows_at(growth)
         if growth is not None:
-            found = growth if other.grows_at(growth) else other.passed_growth
-            self.other_growths = [*self.other_growths, found]
+            passed = growth if same else other.passed_growth
+            self.other_growths = [*self.other_growths, passed]
         low, high = (self, other) if self.highest < other.highest else (other, self)
         apart = high.highest > (1 + precision) * low.highest
         if not (apart and self.passes_growth and not low.slides and high.grows_at(low.highest)):
             differs = super().widen(other, precision)
-            if not (differs and growth is not None and self.other_growths[-1] == growth):
-                return differs
-            self.differs_after_growth = True
-            return False
+            self.differs_after_growth |= differs and same
+            return differs and not same
         low.passed_to = max(low.passed_to, high.highest, high.passed_to)
         return self is high
 
