@@ -391,8 +391,7 @@ def test_a_branch_that_ends_where_water_enters_ends_in_unstable_crack_growth(ope
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("first", [11.13, 18.55])
-def test_many_points_that_soften_by_a_little_are_growth(first):
+def test_many_points_that_soften_by_a_little_are_growth():
     """The halves of an increment agreed that passed over a growth at 54.92 m, to 56.67 m, as no
     single point softened by much in one of them.
     """
@@ -400,7 +399,7 @@ def test_many_points_that_soften_by_a_little_are_growth(first):
     joint = {"K_N": 7.94e10, "K_T": 5.161e10, "mu": 0.974, "adhesion": 45.1e3, "sigma_max": 877e3}
     joint |= {"law": "rupture", "pena_rupture": 9.82, "alpha": 1.5, "uplift": "none"}
     concrete = {"E": 1.08e10, "E_found": 4.882e9, "nu": 0.182}
-    _, answer = search_result("dam", settings=section | joint | concrete, levels=f"{first}")
+    _, answer = search_result("dam", settings=section | joint | concrete, levels="11.13")
     assert answer.confirmed and answer.mode == "unstable crack growth"
     assert answer.growth == answer.value == pytest.approx(54.919, rel=path.PRECISION / 2)
 
@@ -440,8 +439,7 @@ def test_a_fall_of_nearly_as_much_as_unstable_growth_before_the_highest_level():
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("first", [7.77, 12.95])
-def test_the_slip_is_prescribed_where_all_other_displacements_move_back(first):
+def test_the_slip_is_prescribed_where_all_other_displacements_move_back():
     """As points that were pressed open beside the toe the joint slips, and closes at the heel: no
     increment of crest, joint or process zone leads on from 45.893 m, and a long one to 46.026 m.
     """
@@ -449,13 +447,12 @@ def test_the_slip_is_prescribed_where_all_other_displacements_move_back(first):
     joint = {"K_N": 2.84e11, "K_T": 1.301e11, "mu": 1.15, "adhesion": 684e3, "sigma_max": 79e3}
     joint |= {"law": "bond", "G_f": 197, "G_t": 1150, "uplift": "drained", "drain_x": 2.37}
     concrete = {"E": 1.04e10, "E_found": 1.633e10, "nu": 0.227}
-    _, answer = search_result("dam", settings=section | joint | concrete, levels=f"{first}")
+    _, answer = search_result("dam", settings=section | joint | concrete, levels="12.95")
     assert answer.confirmed and answer.value == pytest.approx(46.025, rel=path.PRECISION)
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("first", [22.0, 36.6])
-def test_the_level_is_highest_before_water_enters_a_point(first):
+def test_the_level_is_highest_before_water_enters_a_point():
     """It falls as the uplift enters the third element, to where the whole joint slips, at 69.804 m:
     an increment over that limit point, 69.864 to 69.869 m, confirmed the lower level.
     """
@@ -463,7 +460,7 @@ def test_the_level_is_highest_before_water_enters_a_point(first):
     joint = {"K_N": 2.88e11, "K_T": 1.486e11, "adhesion": 0, "sigma_max": 0, "mu": 0.811}
     joint |= {"law": "friction", "uplift": "cracked"}
     concrete = {"E": 1.86e10, "E_found": 9.486e9, "nu": 0.225}
-    _, answer = search_result("dam", settings=section | joint | concrete, levels=f"{first}")
+    _, answer = search_result("dam", settings=section | joint | concrete, levels="22")
     assert answer.confirmed and answer.value == pytest.approx(69.8665, rel=path.PRECISION / 2)
 
 
@@ -485,8 +482,7 @@ def test_a_joint_that_slips_whole_holds_more_as_water_leaves_it():
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("first", [16.989, 28.3])
-def test_a_path_is_continued_from_a_run_where_water_enters(first):
+def test_a_path_is_continued_from_a_run_where_water_enters():
     """Each element that the water enters turns the path, which ended at 80.11 m, while runs stand
     above, with as much uplift: no level was confirmed. The whole joint slips at 83.69 m or, with
     less uplift, 84.03 m. Some runs stop at 80.11 m, which was confirmed; from a lower first level,
@@ -496,8 +492,8 @@ def test_a_path_is_continued_from_a_run_where_water_enters(first):
     joint = {"K_N": 6.984e11, "K_T": 4.486e11, "adhesion": 437.9e3, "sigma_max": 593.7e3}
     joint |= {"law": "friction", "mu": 1.161, "uplift": "cracked", "drains": 1, "drain_x": 5.163}
     concrete = {"E": 2.95e10, "E_found": 4.137e9, "nu": 0.1463}
-    search = Search(load("dam", section | joint | concrete, f"{first}", "0"), "level")
-    path, _ = finished(search.path(first, search.base, 100.0, to_growth=True))
+    search = Search(load("dam", section | joint | concrete, "16.989", "0"), "level")
+    path, _ = finished(search.path(16.989, search.base, 100.0, to_growth=True))
     begin = next(point for point in path.points if len(point.model.case.levels) > 1)
     assert begin.level < 80.2 and path.has_full_uplift(path.points[path.top].history)[-1]
     assert path.ran_on and path.slides and 83.68 < path.highest < 84.03
@@ -570,7 +566,7 @@ def test_levels_count_up_to_the_longest_crack_that_is_full_of_water(wet, counted
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize(("first", "change"), [(33.0, 0.0), (49.5, 0.0), (49.5, 1e-12)])
+@pytest.mark.parametrize(("first", "change"), [(33.0, 0.0), (49.5, 1e-12)])
 def test_a_growth_that_some_or_all_paths_pass_is_the_critical_level(first, change):
     """A path of a wet crack ends at 112.79 m, or is led over the growth there by relaxation, to
     115.35 m, as rounding decides: of a strength changed by 1e-12, or on another processor. No level
@@ -604,8 +600,7 @@ def test_a_growth_that_all_paths_pass_is_that_of_a_finer_mesh():
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("first", [16.35, 27.25])
-def test_a_level_after_growth_is_not_the_highest_if_it_is_the_same(first):
+def test_a_level_after_growth_is_not_the_highest_if_it_is_the_same():
     """An increment over the growth at 57.275 m leads to 57.299 m, a shorter one to 57.248 m: either
     57.299 or 57.275 m was confirmed.
     """
@@ -613,7 +608,7 @@ def test_a_level_after_growth_is_not_the_highest_if_it_is_the_same(first):
     joint = {"K_N": 5.92e11, "K_T": 3.996e11, "mu": 0.74, "adhesion": 149e3, "sigma_max": 160e3}
     joint |= {"law": "bond", "G_f": 92.6, "G_t": 103, "uplift": "cracked"}
     concrete = {"E": 1.05e10, "E_found": 2.016e10, "nu": 0.191}
-    _, answer = search_result("dam", settings=section | joint | concrete, levels=f"{first}")
+    _, answer = search_result("dam", settings=section | joint | concrete, levels="27.25")
     assert answer.confirmed and answer.value == pytest.approx(57.275, rel=path.PRECISION / 2)
 
 
@@ -626,9 +621,8 @@ def test_no_level_is_the_highest_as_water_has_not_entered_the_points_opened_in_a
     joint = {"K_N": 5.37e11, "K_T": 4.57e11, "mu": 0.914, "adhesion": 181e3, "sigma_max": 596e3}
     joint |= {"law": "bond", "G_f": 168, "G_t": 125, "uplift": "cracked"}
     concrete = {"E": 2.29e10, "E_found": 1.697e10, "nu": 0.195}
-    for first in ("20.67", "31.005"):
-        _, answer = search_result("dam", settings=section | joint | concrete, levels=first)
-        assert answer.confirmed and answer.value == pytest.approx(73.588, rel=path.PRECISION / 2)
+    _, answer = search_result("dam", settings=section | joint | concrete, levels="20.67")
+    assert answer.confirmed and answer.value == pytest.approx(73.588, rel=path.PRECISION / 2)
 
 
 @pytest.mark.heavy
@@ -790,7 +784,7 @@ def test_a_rigid_block_that_opens_to_its_toe():
     opens, by more than the precision: it need not be confirmed. Higher levels, up to 49.9 m, have
     less uplift than the open crack.
     """
-    settings = UNBONDED | {"mu": 3.0, "uplift": "cracked", "n_joint": 20.0}
+    settings = UNBONDED | {"mu": 3.0, "uplift": "cracked", "n_joint": 10.0}
     _, answer = search_result("dam", settings=settings)
     assert answer.mode == "overturning"
     assert answer.value == pytest.approx(answer.gravity, rel=0.003)
@@ -1124,12 +1118,11 @@ def test_a_release_of_shear_without_a_fall_of_the_level_is_no_growth():
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("levels", ["6.072,20.24", "10"])
-def test_where_a_point_releases_its_shear_and_none_breaks_no_crack_grows(levels):
+def test_where_a_point_releases_its_shear_and_none_breaks_no_crack_grows():
     """By levels the point at 19.95 m is passed over, by increments of a displacement it was not:
     the first unstable growth was there, or at 24.87 m, confirmed.
     """
-    _, answer = search_result("dam", settings=RELEASED, levels=levels)
+    _, answer = search_result("dam", settings=RELEASED, levels="10")
     assert answer.confirmed and answer.value == pytest.approx(24.9629, rel=1e-5)
 
 
@@ -1147,14 +1140,13 @@ OPENS |= {
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("levels", ["7.02", "11.7"])
-def test_a_path_goes_on_where_relaxation_leads_higher_and_no_tension_is_lost(levels):
+def test_a_path_goes_on_where_relaxation_leads_higher_and_no_tension_is_lost():
     """The branch ends as the shear of a point is released, at 26.551 m, which was said to be
     unstable growth; nothing is damaged there, and filling leads on.
     """
-    search, answer = search_result("dam", settings=OPENS, levels=levels)
+    search, answer = search_result("dam", settings=OPENS, levels="7.02")
     assert answer.confirmed and answer.value == pytest.approx(27.1031, rel=1e-5)
-    path, _ = finished(search.path(float(levels), search.base, 46.0, to_growth=True))
+    path, _ = finished(search.path(7.02, search.base, 46.0, to_growth=True))
     assert path.stepped_to and path.stepped_to[0].damage.max() == 0
     assert 26.55 < path.stepped_to[0].level < 26.58
 

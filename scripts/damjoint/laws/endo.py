@@ -31,8 +31,9 @@ LEAST = 1e-18
 LARGEST = 1 - 1e-12
 #: Most iterations for the damage, as in pro/law_endo.pro; usually 3 to 7. Then a bracket <= 2e-8.
 MOST_ITERATIONS = 32
-#: Where they end: change of log(alpha/(1 - alpha)) [-]. Newton's method has then rounded digits.
-ACCURACY = 1e-10
+#: Where they end: change of log(alpha/(1 - alpha)) [-], by bisection, and by Newton's method, which
+#: has rounded digits then, as it converges quadratically.
+ACCURACY, QUADRATIC = 1e-10, 1e-6
 
 
 @dataclass(frozen=True)
@@ -181,27 +182,27 @@ class Endo(SofteningLaw[EndoVariables]):
         the logarithms of the rate and of alpha/(1 - alpha), within a bracket.
         """
         alpha = variables.alpha.copy()
-        grows = self.plastic_return(jump, variables, alpha).release_rate > 1
+        at = self.plastic_return(jump, variables, alpha)
+        grows = at.release_rate > 1
         if not grows.any():
             return alpha
-        jump = jump[grows]
+        jump, rate, decrease = jump[grows], at.release_rate[grows], at.decrease[grows]
         variables = EndoVariables(alpha[grows], variables.plastic[grows])
-        low = np.log(np.maximum(variables.alpha, LEAST)) - np.log1p(-variables.alpha)
-        high = np.full(len(low), np.log(LARGEST) - np.log1p(-LARGEST))
-        odds = np.where(variables.alpha > 0, low, 0.0)
+        share = np.maximum(variables.alpha, LEAST)
+        odds = np.log(share) - np.log1p(-share)
+        low, high = odds, np.full(len(odds), np.log(LARGEST) - np.log1p(-LARGEST))
         for _ in range(MOST_ITERATIONS):
-            share = 1 / (1 + np.exp(-odds))
-            at = self.plastic_return(jump, variables, share)
-            low = np.where(at.release_rate > 1, odds, low)
-            high = np.where(at.release_rate > 1, high, odds)
-            slope = at.decrease * share * (1 - share) / at.release_rate
-            newton = odds + np.log(at.release_rate) / slope
+            low, high = np.where(rate > 1, odds, low), np.where(rate > 1, high, odds)
+            newton = odds + np.log(rate) * rate / (decrease * share * (1 - share))
             inside = (newton >= low) & (newton <= high)
             step = np.where(inside, newton, (low + high) / 2) - odds
             odds = odds + step
-            if (np.abs(step) <= ACCURACY).all():
+            share = 1 / (1 + np.exp(-odds))
+            if np.all(np.abs(step) <= np.where(inside, QUADRATIC, ACCURACY)):
                 break
-        alpha[grows] = np.maximum(1 / (1 + np.exp(-odds)), variables.alpha)
+            at = self.plastic_return(jump, variables, share)
+            rate, decrease = at.release_rate, at.decrease
+        alpha[grows] = np.maximum(share, variables.alpha)
         return alpha
 
     # -- response
