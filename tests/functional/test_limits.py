@@ -6,7 +6,7 @@ from closed_forms import BASE, CENTROID, WATER, WEIGHT, slide_level, thrust
 from damjoint import cli
 from damjoint.statics.hints import hints
 from damjoint.statics.statement import statement
-from damjoint.statics.verdict import verdict
+from damjoint.statics.verdict import failed, verdict
 from numpy.testing import assert_allclose
 
 
@@ -39,6 +39,23 @@ def test_hardening_holds_the_dam_beyond_sliding(solve):
     slip = np.sum(np.diff(rows["x"]) * (rows["slip"][1:] + rows["slip"][:-1]) / 2) / BASE
     assert slip == pytest.approx(mean, rel=2e-3)
     assert result.history["slip_length"][-1] == pytest.approx(BASE)
+
+
+@pytest.mark.parametrize("above, slides", [(-1e-4, False), (1e-4, True)])
+def test_a_dam_beyond_sliding_does_not_stand_on_a_default_hardening(solve, above, slides):
+    """T = mu N + c L; at the toe a point still sticks beyond it, as the others harden. It stood up
+    to 0.3 % above the critical level.
+    """
+    dam = {"dam_height": 110, "dam_base": 86.35, "dam_crest": 14.68, "n_joint": 20, "E": 2.15e10}
+    dam |= {"nu": 0.199, "E_found": 1.694e10, "uplift": "drained", "drain_x": 8.635}
+    joint = {"law": "friction", "K_N": 2.96e11, "K_T": 1.37e11, "mu": 1.01, "adhesion": 272e3}
+    level = 170.2174 * (1 + above)
+    (result,) = solve("dam", f"55,120,150,{level}", "0", **dam, **joint)
+    last, words = result.last, statement(result)
+    assert last["slip_length"] < 86 and verdict(result) == ("sliding" if slides else "stands")
+    assert (last["T"] > 1.01 * last["N"] + 272e3 * 86.35) == slides
+    assert ("the shear force on the joint exceeds its strength from level 170.2" in words) == slides
+    assert failed(result) == slides
 
 
 def test_overturning(solve):

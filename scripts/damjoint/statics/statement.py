@@ -12,7 +12,16 @@ from ..model.results import Results
 from ..solver.path_point import FALL, PRECISION
 from ..units import FORCES, STRESSES, with_unit
 from . import gravity
-from .verdict import STIFF_JOINT, Bound, bound, failure, slipped_from, stiffness_ratio, verdict
+from .verdict import (
+    STIFF_JOINT,
+    Bound,
+    bound,
+    exceeded_from,
+    failure,
+    slipped_from,
+    stiffness_ratio,
+    verdict,
+)
 
 #: Why there is no equilibrium above a bound of statics, by how the dam fails there.
 REASONS = {
@@ -37,10 +46,15 @@ def statement(results: Results) -> str:
         return f"{verdict(results)}: {reason_of_stop(results)}; the last converged state is saved"
     if not mode:
         return ""
-    level = max(slipped_from(results.joints[k]) or 0.0 for k in why.joints)
+    slipped = [slipped_from(results.joints[number]) for number in why.joints]
     case = case.joints[why.joints[0]]
     hardening, where = case.law.hardening_parameter, joint or "joint"
-    slides = f"sliding: the whole {where} has slipped or is open from level {level:.6g} m on"
+    if None in slipped:
+        slipped = [exceeded_from(results.joints[number]) for number in why.joints]
+        slides = f"sliding: the shear force on the {where} exceeds its strength"
+    else:
+        slides = f"sliding: the whole {where} has slipped or is open"
+    slides += f" from level {max(level or 0.0 for level in slipped):.6g} m on"
     if not hardening:
         return f"{slides}; the joint has no further shear strength"
     default = ", a numerical default; set it if your joint hardens"

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from .. import ROUND_OFF
-from ..arrays import Array
+from ..arrays import Array, BoolArray
 from ..input.case import Case
 from ..input.values import freezes_uplift, level_unknown
 from ..model.loads import COMPLETE, thermal_strains
@@ -53,8 +53,8 @@ def verdict(results: Results) -> str:
     """One of: stands, sliding, overturning, broken through, out of range, not converged,
     interrupted; a failure with its joint if there are several: "sliding on base".
 
-    "sliding" also where the whole joint has slipped or opened and only the hardening of the joint
-    resists.
+    "sliding" also where the whole joint has slipped or opened, or its shear force exceeds its
+    strength, and only the hardening of the joint resists.
     """
     why = failure(results)
     joint = why.at(results.case)
@@ -117,9 +117,13 @@ def failing_joints(results: Results) -> tuple[int, ...]:
 
 
 def slipped_joints(results: Results) -> tuple[int, ...]:
-    """The joints that alone hold what is above and have slipped along all of their length."""
+    """The joints that alone hold what is above and have slipped along all of their length, or whose
+    shear force exceeds their strength.
+    """
     slipped = [
-        k for k, joint_result in enumerate(results.joints) if slipped_from(joint_result) is not None
+        number
+        for number, joint_result in enumerate(results.joints)
+        if slipped_from(joint_result) is not None or exceeded_from(joint_result) is not None
     ]
     return results.case.graph.separating(slipped)
 
@@ -140,12 +144,32 @@ def slipped_from(results: Results) -> float | None:
             return None
     history, base = results.history, results.case.joint_length
     slipped = np.maximum(history["slip_length"], history["crack_length"]) > base * (1 - ROUND_OFF)
-    if slipped.any() and slipped[-1]:
-        return float(history["level"][np.flatnonzero(~slipped)[-1] + 1 if not slipped.all() else 0])
+    if slipped[-1]:
+        return level_from(results, slipped)
     rows = results.at() if len(results.joint["time"]) else {}
     if rows and np.all((rows["damage"] >= 1) | (rows["slip"] > 0)):
         return float(rows["level"][0])
     return None
+
+
+def exceeded_from(results: Results) -> float | None:
+    """The level [m] from which on the shear force exceeds mu N + c L on the only joint of these
+    results, a straight one: what is missing is held by its hardening alone, though a part of it may
+    stick. None if it does not.
+    """
+    case, history = results.case, results.history
+    straight = case.joint_along <= case.joint_length * (1 + ROUND_OFF)
+    if not (case.law.hardening_parameter and straight):
+        return None
+    strengths = [case.law.shear_resistance(n, case.joint_along, 0.0, 0.0) for n in history["N"]]
+    exceeds = np.abs(history["T"]) > np.array(strengths) * (1 + EXCEEDED)
+    return level_from(results, exceeds) if exceeds[-1] else None
+
+
+def level_from(results: Results, holds: BoolArray) -> float:
+    """The level [m] of the step from which on something holds in all of them, the last included."""
+    others = np.flatnonzero(~holds)
+    return float(results.history["level"][others[-1] + 1 if len(others) else 0])
 
 
 def why_stopped(results: Results) -> Failure:
@@ -182,6 +206,8 @@ def shear_resistance(results: Results, normal: float) -> float:
     return law.mu * normal + mean_along(rows["s"], more) * length
 
 
+#: By how much a shear force exceeds a strength, over it, if that is more than rounding [-].
+EXCEEDED = 1e-6
 #: Relative distance to a bound of statics within which a state has reached it: the last step of a
 #: run is known to 1/1024 of the step between two levels.
 AT_BOUND = 5e-3
