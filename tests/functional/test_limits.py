@@ -58,6 +58,22 @@ def test_a_dam_beyond_sliding_does_not_stand_on_a_default_hardening(solve, above
     assert failed(result) == slides
 
 
+@pytest.mark.parametrize("level, stands", [(59.37, True), (59.40, False)])
+def test_a_dam_of_which_each_point_has_slipped_stands_if_its_strength_is_not_used(
+    solve, level, stands
+):
+    """T = mu N + c L at 59.385 m: from 59.355 m on each point has slipped once, and it was said to
+    slide, at 0.9989 of its strength.
+    """
+    dam = {"dam_height": 46.5, "dam_base": 39.85, "dam_crest": 6.695, "n_joint": 20, "E": 1.81e10}
+    joint = {"law": "friction", "K_N": 1.76e11, "K_T": 1.725e11, "mu": 1.12, "adhesion": 0}
+    rest = {"uplift": "imposed", "E_found": 1.528e10, "nu": 0.208}
+    (result,) = solve("dam", f"23.25,40,50,57,{level}", "0", **dam, **joint, **rest)
+    assert (result.last["T"] < 1.12 * result.last["N"]) == stands
+    assert result.last["slip_length"] == pytest.approx(39.85)
+    assert verdict(result) == ("stands" if stands else "sliding")
+
+
 def test_overturning(solve):
     """Half the weight, no tension: N leaves the base at (6 W (b - xc)/WATER)^(1/3) = 9.097 m."""
     limit = (6 * WEIGHT / 2 * (BASE - CENTROID) / WATER) ** (1 / 3)

@@ -16,10 +16,10 @@ from .verdict import (
     STIFF_JOINT,
     Bound,
     bound,
-    exceeded_from,
     failure,
-    slipped_from,
+    slides_from,
     stiffness_ratio,
+    strength_known,
     verdict,
 )
 
@@ -46,15 +46,13 @@ def statement(results: Results) -> str:
         return f"{verdict(results)}: {reason_of_stop(results)}; the last converged state is saved"
     if not mode:
         return ""
-    slipped = [slipped_from(results.joints[number]) for number in why.joints]
+    level = max(slides_from(results.joints[number]) or 0.0 for number in why.joints)
     case = case.joints[why.joints[0]]
     hardening, where = case.law.hardening_parameter, joint or "joint"
-    if None in slipped:
-        slipped = [exceeded_from(results.joints[number]) for number in why.joints]
-        slides = f"sliding: the shear force on the {where} exceeds its strength"
-    else:
-        slides = f"sliding: the whole {where} has slipped or is open"
-    slides += f" from level {max(level or 0.0 for level in slipped):.6g} m on"
+    what = f"the whole {where} has slipped or is open"
+    if strength_known(case):
+        what = f"the shear force on the {where} exceeds its strength"
+    slides = f"sliding: {what} from level {level:.6g} m on"
     if not hardening:
         return f"{slides}; the joint has no further shear strength"
     default = ", a numerical default; set it if your joint hardens"

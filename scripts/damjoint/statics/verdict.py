@@ -117,27 +117,47 @@ def failing_joints(results: Results) -> tuple[int, ...]:
 
 
 def slipped_joints(results: Results) -> tuple[int, ...]:
-    """The joints that alone hold what is above and have slipped along all of their length, or whose
-    shear force exceeds their strength.
-    """
+    """The joints that alone hold what is above and slide, see `slides_from`."""
     slipped = [
-        number
-        for number, joint_result in enumerate(results.joints)
-        if slipped_from(joint_result) is not None or exceeded_from(joint_result) is not None
+        k for k, joint_result in enumerate(results.joints) if slides_from(joint_result) is not None
     ]
     return results.case.graph.separating(slipped)
 
 
-def slipped_from(results: Results) -> float | None:
+def slides_from(results: Results) -> float | None:
     """The level [m] from which on the whole joint, the only one of these results, has slipped or is
-    open; None if a part of it sticks, or if a dam that has slipped stands by the joint law.
+    open, or its shear force exceeds its strength; None if it does not, or if a dam that has slipped
+    stands by the joint law.
+    """
+    if results.case.law.stands_slipped:
+        return None
+    return exceeded_from(results) if strength_known(results.case) else slipped_from(results)
+
+
+def strength_known(case: Case) -> bool:
+    """Whether mu N + c L is the strength of the only joint, a straight one in 2D, until it hardens:
+    a larger shear force is held by the hardening alone, also where a point sticks, and a smaller
+    one by the strength, also where each point has slipped once.
+    """
+    straight = case["dim"] == 2 and case.joint_along <= case.joint_length * (1 + ROUND_OFF)
+    return bool(case.law.hardening_parameter) and straight
+
+
+def exceeded_from(results: Results) -> float | None:
+    """The level [m] from which on the shear force exceeds mu N + c L; None if it does not."""
+    case, history = results.case, results.history
+    strengths = [case.law.shear_resistance(n, case.joint_along, 0.0, 0.0) for n in history["N"]]
+    exceeds = np.abs(history["T"]) > np.array(strengths) * (1 + EXCEEDED)
+    return level_from(results, exceeds) if exceeds[-1] else None
+
+
+def slipped_from(results: Results) -> float | None:
+    """The level [m] from which on the whole joint has slipped or is open; None if a part sticks.
 
     A point that has slipped once counts as slipped. By the integration points of every
     step, or by the nodes at the last requested level. A change of temperature can let every point
     slip, in opposite directions: with it the shear force has to reach the strength, too.
     """
-    if results.case.law.stands_slipped:
-        return None
     if thermal_strains(results.case, COMPLETE):
         resistance = shear_resistance(results, results.last["N"])
         if abs(results.last["T"]) < (1 - AT_BOUND) * resistance < np.inf:
@@ -150,20 +170,6 @@ def slipped_from(results: Results) -> float | None:
     if rows and np.all((rows["damage"] >= 1) | (rows["slip"] > 0)):
         return float(rows["level"][0])
     return None
-
-
-def exceeded_from(results: Results) -> float | None:
-    """The level [m] from which on the shear force exceeds mu N + c L on the only joint of these
-    results, a straight one: what is missing is held by its hardening alone, though a part of it may
-    stick. None if it does not.
-    """
-    case, history = results.case, results.history
-    straight = case.joint_along <= case.joint_length * (1 + ROUND_OFF)
-    if not (case.law.hardening_parameter and straight):
-        return None
-    strengths = [case.law.shear_resistance(n, case.joint_along, 0.0, 0.0) for n in history["N"]]
-    exceeds = np.abs(history["T"]) > np.array(strengths) * (1 + EXCEEDED)
-    return level_from(results, exceeds) if exceeds[-1] else None
 
 
 def level_from(results: Results, holds: BoolArray) -> float:
