@@ -156,13 +156,15 @@ def test_reason_of_a_stop(name, last, reason):
 @pytest.mark.parametrize(
     "name, last, found, failure",
     [
-        ("c", {"slip_length": 4.9}, "stands", False),
-        ("c", {"slip_length": 5.0}, "sliding", False),  # its hardening is set
+        # strength 0.35 * 1e5 + 1000 * 5 = 40000; its hardening is set
+        ("c", {"slip_length": 5.0, "T": 39_999}, "stands", False),
+        ("c", {"slip_length": 4.9, "T": 40_001}, "sliding", False),
         ("a", {"crack_length": 5.0}, "sliding", True),
         ("a", {"slip": 1e-6}, "sliding", True),  # all nodes have slipped
     ],
 )
-def test_a_dam_on_a_fully_slipped_joint_slides(name, last, found, failure):
-    result = results(name, stopped=False, N=1e5, T=1e4, M=2e5, **last)
+def test_a_dam_slides_beyond_its_strength_or_on_a_fully_slipped_joint(name, last, found, failure):
+    result = results(name, stopped=False, **{"N": 1e5, "T": 1e4, "M": 2e5} | last)
     assert (verdict(result), failed(result)) == (found, failure)
-    assert statement(result).startswith("sliding: the whole joint") == (found == "sliding")
+    words = "the shear force on the joint exceeds" if name == "c" else "the whole joint has slipped"
+    assert statement(result).startswith(f"sliding: {words}") == (found == "sliding")
