@@ -42,9 +42,9 @@ def test_hardening_holds_the_dam_beyond_sliding(solve):
 
 
 @pytest.mark.parametrize("above, slides", [(-1e-4, False), (1e-4, True)])
-def test_a_dam_beyond_sliding_does_not_stand_on_a_default_hardening(solve, above, slides):
-    """T = mu N + c L; at the toe a point still sticks beyond it, as the others harden. It stood up
-    to 0.3 % above the critical level.
+def test_a_dam_does_not_stand_on_a_default_hardening(solve, above, slides):
+    """T = mu N + c L; at a higher level a point at the toe still sticks, as the others harden. The
+    verdict was "stands" up to 0.3 % above the critical level.
     """
     dam = {"dam_height": 110, "dam_base": 86.35, "dam_crest": 14.68, "n_joint": 20, "E": 2.15e10}
     dam |= {"nu": 0.199, "E_found": 1.694e10, "uplift": "drained", "drain_x": 8.635}
@@ -62,8 +62,8 @@ def test_a_dam_beyond_sliding_does_not_stand_on_a_default_hardening(solve, above
 def test_a_dam_of_which_each_point_has_slipped_stands_if_its_strength_is_not_used(
     solve, level, stands
 ):
-    """T = mu N + c L at 59.385 m: from 59.355 m on each point has slipped once, and it was said to
-    slide, at 0.9989 of its strength.
+    """T = mu N + c L at 59.385 m: from 59.355 m on each point has slipped once, and the verdict
+    was "sliding", at 0.9989 of its strength.
     """
     dam = {"dam_height": 46.5, "dam_base": 39.85, "dam_crest": 6.695, "n_joint": 20, "E": 1.81e10}
     joint = {"law": "friction", "K_N": 1.76e11, "K_T": 1.725e11, "mu": 1.12, "adhesion": 0}

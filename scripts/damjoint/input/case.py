@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from .. import InputError
+from .. import ROUND_OFF, InputError
 from ..arrays import Setting, Value, Values
 from ..laws import LAWS, Law
 from .casefile import joint_name as joint_name
@@ -304,6 +304,11 @@ class Case(ParameterValues):
     def joint_along(self) -> float:
         """Length from heel to toe along the joint [m]; its mean in 3D."""
         return self.section["joint_along"][0]
+
+    @property
+    def has_straight_joint(self) -> bool:
+        """Whether the joint is straight from heel to toe."""
+        return self.joint_along <= (1 + ROUND_OFF) * self.joint_length
 
     @property
     def requested(self) -> tuple[float, ...]:

@@ -29,10 +29,10 @@ BROKEN = 0.7203615675
 LEAST = 1e-18
 #: Largest damage [-], at which S = 1e-36.
 LARGEST = 1 - 1e-12
-#: Most iterations for the damage, as in pro/law_endo.pro; usually 3 to 7. Then a bracket <= 2e-8.
+#: Most iterations for the damage, as in pro/law_endo.pro; usually 1 to 5. Then a bracket <= 2e-8.
 MOST_ITERATIONS = 32
-#: Where they end: change of log(alpha/(1 - alpha)) [-], by bisection, and by Newton's method, which
-#: has rounded digits then, as it converges quadratically.
+#: Where they end: change of log(alpha/(1 - alpha)) [-] by bisection, and by Newton's method, whose
+#: error is then its square, below rounding.
 ACCURACY, QUADRATIC = 1e-10, 1e-6
 
 

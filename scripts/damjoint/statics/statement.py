@@ -46,7 +46,7 @@ def statement(results: Results) -> str:
         return f"{verdict(results)}: {reason_of_stop(results)}; the last converged state is saved"
     if not mode:
         return ""
-    level = max(slides_from(results.joints[number]) or 0.0 for number in why.joints)
+    level = max(slides_from(results.joints[k]) or 0.0 for k in why.joints)
     case = case.joints[why.joints[0]]
     hardening, where = case.law.hardening_parameter, joint or "joint"
     what = f"the whole {where} has slipped or is open"

@@ -67,18 +67,18 @@ def failure(results: Results) -> Failure:
         return why_at_first(results.case)
     if results.stopped:
         return why_stopped(results)
-    slipped = slipped_joints(results)
-    return Failure("sliding", slipped) if slipped else Failure()
+    sliding = sliding_joints(results)
+    return Failure("sliding", sliding) if sliding else Failure()
 
 
 def failed(results: Results) -> bool:
     """Whether the exit code is 1: stopped, or sliding on a hardening that the user has not set."""
     if results.stopped or not results.last:
         return True
-    slipped = slipped_joints(results)
-    joints = [results.case.joints[k] for k in slipped]
+    sliding = sliding_joints(results)
+    joints = [results.case.joints[k] for k in sliding]
     hardening_set = all(j.law.hardening_parameter and j.hardening_requested for j in joints)
-    return bool(slipped) and not hardening_set
+    return bool(sliding) and not hardening_set
 
 
 def decisive_joint(results: Results) -> int:
@@ -116,12 +116,12 @@ def failing_joints(results: Results) -> tuple[int, ...]:
     return (0,) if why.mode and not results.case.of_joints else why.joints
 
 
-def slipped_joints(results: Results) -> tuple[int, ...]:
+def sliding_joints(results: Results) -> tuple[int, ...]:
     """The joints that alone hold what is above and slide, see `slides_from`."""
-    slipped = [
+    sliding = [
         k for k, joint_result in enumerate(results.joints) if slides_from(joint_result) is not None
     ]
-    return results.case.graph.separating(slipped)
+    return results.case.graph.separating(sliding)
 
 
 def slides_from(results: Results) -> float | None:
@@ -139,15 +139,15 @@ def strength_known(case: Case) -> bool:
     a larger shear force is held by the hardening alone, also where a point sticks, and a smaller
     one by the strength, also where each point has slipped once.
     """
-    straight = case["dim"] == 2 and case.joint_along <= case.joint_length * (1 + ROUND_OFF)
-    return bool(case.law.hardening_parameter) and straight
+    return bool(case.law.hardening_parameter) and case["dim"] == 2 and case.has_straight_joint
 
 
 def exceeded_from(results: Results) -> float | None:
     """The level [m] from which on the shear force exceeds mu N + c L; None if it does not."""
     case, history = results.case, results.history
-    strengths = [case.law.shear_resistance(n, case.joint_along, 0.0, 0.0) for n in history["N"]]
-    exceeds = np.abs(history["T"]) > np.array(strengths) * (1 + EXCEEDED)
+    cohesion = case.law.shear_resistance(0.0, case.joint_along, 0.0, 0.0)
+    strength = case.law.mu * history["N"] + cohesion
+    exceeds = np.abs(history["T"]) > (1 + EXCEEDED) * strength
     return level_from(results, exceeds) if exceeds[-1] else None
 
 
@@ -173,7 +173,9 @@ def slipped_from(results: Results) -> float | None:
 
 
 def level_from(results: Results, holds: BoolArray) -> float:
-    """The level [m] of the step from which on something holds in all of them, the last included."""
+    """The level [m] of the first of the last steps, in all of which a condition holds; holds: in
+    which steps it does.
+    """
     others = np.flatnonzero(~holds)
     return float(results.history["level"][others[-1] + 1 if len(others) else 0])
 

@@ -478,7 +478,7 @@ class FailurePath(EquilibriumPath):
             return False
         top = self.points[self.top]
         if not (self.releases_shear or top.uplift_follows):
-            return False  # of 125 random dams with bond or endo, none went on so
+            return False  # of 125 random dams with bond or endo, none continued this way
         ends = self.relaxed_above(top, range(RISES))
         end = next((end for end in ends if not end.has_grown(top)), None)
         if end is None:

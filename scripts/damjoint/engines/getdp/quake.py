@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import ROUND_OFF, InputError, RunError, require
+from ... import InputError, RunError, require
 from ...arrays import Table, Value
 from ...dynamics.record import Record
 from ...dynamics.stepper import Damping
@@ -83,9 +83,8 @@ def solve(
     if case.geometry:
         case = with_paths(case, mesh.joints)
         for joint, of_mesh in zip(case.joints, mesh.joints, strict=True):
-            straight = joint.joint_along <= (1 + ROUND_OFF) * joint.joint_length
             rule = f"joint {of_mesh.name} must be straight for an earthquake with engine = getdp"
-            if not straight:
+            if not joint.has_straight_joint:
                 raise InputError(f"geometry = {case.geometry}: {rule}")
     options = {"views": 0.0, "fields": 0.0, "damping_a0": damping.a0, "damping_a1": damping.a1}
     lists = {
